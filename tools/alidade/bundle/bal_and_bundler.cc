@@ -69,7 +69,7 @@ void ReadBundlerCamera(BundleCursor& cursor, BundleFile& file) {
   ReadLens(cursor, true, lens.data());
   cursor.Numbers("rotation of a camera", 9, pose.data());
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> r(pose.data());
-  const bool missing = lens[0] == 0.0 && r.isZero();  // an unregistered image
+  const bool missing = lens[0] == 0.0 && r.isZero();  // the image is not registered
   constexpr double kRounding = 1e-3;
   if (!missing && (!(r * r.transpose()).isIdentity(kRounding) || !(r.determinant() > 0.0)))
     cursor.Fail("the 9 numbers that end here are not a rotation", "an orthonormal matrix");
@@ -202,7 +202,7 @@ BundleFile ReadBundler(std::string_view text, const std::string& name) {
   BundleFile file;
   file.format = BundleFormat::kBundler;
   file.problem.sensor = kRadial;
-  cursor.SkipLine();  // the header
+  cursor.SkipLine();  // skips the header
   const int cameras = cursor.Index("the number of cameras", kMaxIndex);
   const int points = cursor.Index("the number of points", kMaxIndex);
   for (int i = 0; i < cameras; ++i) ReadBundlerCamera(cursor, file);

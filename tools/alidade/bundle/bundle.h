@@ -22,7 +22,7 @@ namespace alidade {
 /// Pose of a camera and the index of its intrinsics.
 struct BundleCamera {
   std::array<double, 3> position{};               ///< position in the world
-  std::array<double, 4> orientation{1, 0, 0, 0};  ///< world_from_cam, w x y z
+  std::array<double, 4> orientation{1, 0, 0, 0};  ///< quaternion world_from_cam, w x y z
   int intrinsics = 0;                             ///< index into BundleProblem::intrinsics
 };
 
@@ -37,7 +37,7 @@ struct BundleProblem {
   /// Entry of the sensor in YAML, as in a config: `model` and the parameters of the model.
   std::string sensor;
   std::vector<BundleCamera> cameras;
-  std::vector<std::vector<double>> intrinsics;  ///< empty if the sensor has no such role
+  std::vector<std::vector<double>> intrinsics;  ///< empty if the sensor has no role `intrinsics`
   std::vector<std::array<double, 3>> points;    ///< positions in the world
   std::vector<BundleObservation> observations;
 };
@@ -88,11 +88,12 @@ struct BundleRoles {
 /// Finds the roles by name. A role of three numbers with any other name is the point. Error:
 /// kInternal if the sensor is not a camera, or does not measure 1 to 4 numbers.
 BundleRoles RolesOf(const SensorModel& sensor);
-/// Returns pointers into `problem` to the values of an observation's roles, in the sensor's order.
+/// Returns a pointer to the value of each role for an observation, in the order of
+/// SensorModel::roles(). The values belong to `problem`.
 std::vector<const double*> RoleValues(const BundleRoles& roles, const BundleProblem& problem,
                                       const BundleObservation& observation);
 
-/// Returns a flag for each element of the intrinsics, which is true if the element is fixed. The
+/// Returns a flag for each element of the intrinsics. The flag is true if the element is fixed. The
 /// result is empty if the sensor does not have the role `intrinsics`. Error: kUsage if `fixed`
 /// contains the name of an unknown element.
 std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std::string>& fixed);
@@ -100,17 +101,17 @@ std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std
 /// Creates the sensor of `problem`. Errors: kPlugin, kBadConfig.
 SharedSensor BundleSensor(const PluginHost& host, const BundleProblem& problem);
 
-/// Excludes observations: sets BundleObservation::used to false if h is undefined or |z (-) h|^2 is
-/// not finite at the values of the problem, otherwise to true. h is undefined for a point behind
-/// the camera. For a projective camera, h is undefined for a point in the plane of the camera.
-/// Returns the number of excluded observations.
+/// Sets BundleObservation::used to false if h is undefined or |z (-) h|^2 is not finite at the
+/// values of the problem, otherwise to true. h is undefined for a point behind the camera. For a
+/// projective camera, h is undefined for a point in the plane of the camera. Returns the number of
+/// excluded observations.
 int ExcludeUndefined(const SensorModel& sensor, BundleProblem& problem);
 
 /// Computes the unweighted RMS reprojection error of the used observations:
 ///
 ///   rms = sqrt(sum_i |z_i (-) h_i|^2 / n),   n the number of observations
 ///
-/// in px, the unit of z. Returns 0 if no observation is used.
+/// The unit is px, as of z. Returns 0 if no observation is used.
 double BundleRms(const SensorModel& sensor, const BundleProblem& problem);
 
 inline constexpr const char* kBundleAdjusterKind = "bundle adjuster";

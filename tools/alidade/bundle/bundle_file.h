@@ -25,13 +25,13 @@ enum class BundleFormat { kBal, kBundler, kLibmv, kTracks };
 /// Returns `bal`, `bundler`, `libmv` or `tracks`.
 const char* ToString(BundleFormat format);
 
-/// A problem and the other contents of its file, which are needed to write the file again.
+/// Problem, and the other contents of the file, which are needed to write the file again.
 struct BundleFile {
   BundleFormat format = BundleFormat::kBal;
   BundleProblem problem;
 
-  /// Pose of a camera with its numbers in the file. If the camera has not moved, the same numbers
-  /// are written again.
+  /// Pose of a camera, and the numbers of this pose in the file. If the camera has not moved, the
+  /// same numbers are written again.
   struct Pose {
     BundleCamera camera;
     std::vector<double> numbers;
@@ -54,7 +54,7 @@ struct BundleFile {
 /// standard input. Errors: kInputMissing; kBadData with the position in the file.
 BundleFile ReadBundle(const std::filesystem::path& file);
 
-/// Input files of a problem of tracks.
+/// Input files of a problem in the format `tracks`.
 struct BundleTracks {
   std::filesystem::path tracks;  ///< file with rows `frame,feature,dim,value`
   std::filesystem::path camera;  ///< YAML with `camera`; a stereo pair has `camera.baseline_m`

@@ -27,7 +27,7 @@ class OutputFolder;
 /// constructor reserves the path, so a conflict is reported before the problem is solved.
 class BundleFolder {
  public:
-  /// Errors: kCannotCreate, kIo.
+  /// Reserves the path. Errors: kCannotCreate, kIo.
   BundleFolder(const std::filesystem::path& folder, bool force);
   ~BundleFolder();
 

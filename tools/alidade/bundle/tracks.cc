@@ -26,7 +26,7 @@ struct TrackEntry {
   std::array<double, 4> z{};
   std::array<int, 4> lines{};  ///< line number of each value in the file; 0: no value
 };
-using Tracks = std::map<std::int64_t, std::map<std::int64_t, TrackEntry>>;  // frame, feature
+using Tracks = std::map<std::int64_t, std::map<std::int64_t, TrackEntry>>;  // keys: frame, feature
 
 Tracks ReadTracks(const std::filesystem::path& path, int& dims) {
   Tracks tracks;
@@ -93,7 +93,7 @@ std::map<std::int64_t, std::size_t> PosesOf(const Tracks& tracks, const Start& s
   }
   std::map<Timestamp, std::size_t> pose_at;
   for (std::size_t i = 0; i < start.timestamps.size(); ++i) pose_at.emplace(start.timestamps[i], i);
-  constexpr Timestamp kTolerance = 1000;  // ns
+  constexpr Timestamp kTolerance = 1000;  // 1000 ns = 1 us
   NumberRows rows(times, {}, {});
   while (NextRow(rows, 2, "frame,t_s")) {
     const Timestamp t = rows.Time(1, "t_s");
@@ -155,8 +155,8 @@ std::optional<std::array<double, 3>> Triangulate(
   return point;
 }
 
-/// Creates the sensor of a problem of tracks from the camera file. Errors name that file. Sets
-/// `text` to the YAML of the sensor.
+/// Creates the sensor of a problem of tracks from the camera file. Errors contain the name of that
+/// file. Sets `text` to the YAML of the sensor.
 SharedSensor TrackSensor(const BundleTracks& sources, int dims, const PluginHost& host,
                          std::string& text) {
   Config config = Config::FromFile(sources.camera);

@@ -34,7 +34,7 @@ struct Finding {
 };
 
 /// Checks the model that `entry` creates from `parameters`. Each check runs in a child process with
-/// the limits of `options`. If a check fails that others depend on, the remaining checks are
+/// the limits of `options`. If a check fails on which later checks depend, these are
 /// skipped. docs/check.md lists the checks. Errors: kBadConfig if the parameters are wrong.
 std::vector<Finding> CheckModel(const PluginEntry& entry, const Node& parameters,
                                 const CheckOptions& options = {});

@@ -37,7 +37,7 @@ class Context {
   /// Returns Predict of a sensor or Step of a motion model.
   const Function& main() const { return model_->functions.front(); }
 
-  /// Error: kBadConfig if the model does not read a given parameter.
+  /// Throws kBadConfig if a given parameter is not read by the model.
   void RejectUnread() const { parameters_.RejectUnread(); }
   /// Creates another instance with the same parameters.
   std::unique_ptr<ModelUnderTest> Create() const;
@@ -48,7 +48,7 @@ class Context {
   static Values Inputs(const Function& f, const CheckedState& state);
   Answer Call(const Function& f, const CheckedState& state, int matrices = kAllMatrices) const;
   Answer CallWith(const Function& f, const Values& inputs, int matrices) const;
-  /// Returns a text such as `Predict at depth = 0.3`.
+  /// Describes a call, as in `Predict at depth = 0.3`.
   std::string CallText(const Function& f, const Values& inputs) const;
   std::string CallText(const Function& f, const CheckedState& state) const {
     return CallText(f, Inputs(f, state));

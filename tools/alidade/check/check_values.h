@@ -7,7 +7,7 @@
 
 #include "alidade/check/model_under_test.h"
 
-/// Conversions of values, their differences and Jacobians to Eigen.
+/// Conversions of values, differences and Jacobians to types of Eigen.
 namespace alidade::internal {
 
 /// Returns the largest magnitude of all elements.
@@ -23,7 +23,7 @@ Eigen::MatrixXd ToMatrix(const Buffer& buffer);
 /// Concatenates all Jacobians of `answer` horizontally.
 Eigen::MatrixXd ConcatenatedJacobian(const Answer& answer);
 
-/// Returns the names of the tangent elements of all spaces, in order.
+/// Returns the names of the tangent elements of all spaces, in the order of the spaces.
 std::vector<std::string> TangentNames(const std::vector<Space>& spaces);
 
 }  // namespace alidade::internal

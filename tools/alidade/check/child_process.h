@@ -12,7 +12,7 @@ namespace alidade::internal {
 /// child dies, the parent reports this call.
 class CallRecord {
  public:
-  /// Error: kInternal.
+  /// Allocates the shared memory. Error: kInternal.
   CallRecord();
   ~CallRecord();
   CallRecord(const CallRecord&) = delete;

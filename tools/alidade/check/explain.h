@@ -7,9 +7,9 @@
 
 namespace alidade {
 
-/// Describes `experiment`, which was built from `config`, without running it. The text lists for
-/// each estimator the blocks and their initial values, the motion models, the sensors, the
-/// unobservable directions of the state, the options and the capabilities.
+/// Describes `experiment`, which was built from `config`, without running it. For each estimator
+/// the text lists the blocks and their initial values, the motion models and the sensors. It also
+/// lists the unobservable directions of the state, the options and the capabilities.
 std::string Explain(const Config& config, const Experiment& experiment);
 
 }  // namespace alidade

@@ -11,7 +11,7 @@
 /// Functions of a model with named inputs and guarded output buffers.
 namespace alidade::internal {
 
-/// One value per space; an empty value is an unbound optional role.
+/// One value for each space. An empty value represents an unbound optional role.
 using Values = std::vector<std::vector<double>>;
 
 /// Row-major matrix, or vector as one row. A cell contains 1e302 until it is written. Guard words
@@ -50,7 +50,7 @@ struct Shape {
 /// One function of the plugin ABI. The concatenated Jacobians are the derivatives of all outputs
 /// with respect to the first `differentiated` inputs, in tangent coordinates.
 struct Function {
-  std::string name;        ///< name in the C++ interface: `Predict`
+  std::string name;        ///< name in the C++ interface, as in `Predict`
   std::vector<int> slots;  ///< the inputs, as indices into ModelUnderTest::slots
   std::vector<Space> outputs;
   std::vector<Shape> matrices;  ///< Jacobians, or the factor of a covariance
@@ -98,7 +98,7 @@ struct ModelUnderTest {
 
 Answer CallFunction(const Function& function, const Values& inputs, int matrices);
 
-/// Returns a text such as `depth = 0.3, orientation = (1, 0, 0, 0)`.
+/// Formats a state, as in `depth = 0.3, orientation = (1, 0, 0, 0)`.
 std::string StateText(const std::vector<Space>& spaces, const Values& values);
 
 /// Returns `count` states with random values, followed by edge states. In an edge state one slot is

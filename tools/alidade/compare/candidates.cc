@@ -63,8 +63,9 @@ const Candidate& FindNamed(const std::string& name, const std::vector<Candidate>
                          internal::NamesOf(candidates));
 }
 
-/// Returns the first usable candidate that satisfies the predicate. If all that satisfy it are
-/// unusable, returns the first of these. Returns null if no candidate satisfies the predicate.
+/// Returns the first usable candidate that satisfies the predicate. If all candidates that satisfy
+/// it are unusable, returns the first of these. Returns null if no candidate satisfies the
+/// predicate.
 const Candidate* FindFirst(const std::vector<Candidate>& candidates,
                            const std::function<bool(const Candidate&)>& predicate) {
   const Candidate* first = nullptr;

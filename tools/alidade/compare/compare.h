@@ -86,8 +86,9 @@ struct DecompositionStep {
   std::string estimator, reference;  ///< names of the two estimators
   bool at_end = false;  ///< true: values of the last frame; there is no full-information filter
   std::map<std::string, Spread> values;
-  std::map<std::string, Ratio> ratios;  ///< `rmse:BLOCK` of `estimator` / that of `reference`
-  std::string withheld;                 ///< reason why there are no values, or ""
+  std::map<std::string, Ratio>
+      ratios;            ///< `rmse:BLOCK` of `estimator` / `rmse:BLOCK` of `reference`
+  std::string withheld;  ///< reason why there are no values, or ""
 };
 
 /// Comparison of estimators over one run or several runs.

@@ -102,9 +102,9 @@ DecompositionStep ComputeStep(DecompositionKind kind, const Candidate* start, co
   return step;
 }
 
-/// Compares the filter with the full-information filter. Without one, as with landmarks, compares
-/// the filter at the last frame with a batch of all data, which equals the full-information filter
-/// there.
+/// Compares the filter with the full-information filter. If that is missing, for example with
+/// landmarks, compares the filter with a batch of all data at the last frame. There, the batch
+/// equals the full-information filter.
 DecompositionStep LinearisationStep(const Candidate& filter, const StepEstimators& estimators,
                                     bool with_truth) {
   const bool has_accepted = estimators.accepted != nullptr && estimators.accepted->is_usable();

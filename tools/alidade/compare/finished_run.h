@@ -16,13 +16,13 @@ namespace alidade::internal {
 
 struct ComparedRun;
 
-/// An estimator of a comparison.
+/// Estimator of a comparison.
 struct Candidate {
   std::string name;                  ///< name in the comparison
   const ComparedRun* run = nullptr;  ///< the run that contains it
   EstimatorResult result;            ///< result of the estimator, without events
   Series series;
-  CpuTime cpu;         ///< zero if unknown
+  CpuTime cpu;         ///< CPU time; zero if unknown
   ErrorSeries errors;  ///< errors, if the run is one of several seeds; otherwise empty
   std::int64_t not_finite_rows = 0;     ///< rows of estimates.csv with a value that is not finite
   bool had_rejection_recovery = false;  ///< true: the event `rejection_recovery` occurred
@@ -36,7 +36,7 @@ struct Candidate {
   std::int64_t used() const;
 };
 
-/// A run with its estimators.
+/// Run of a comparison, and its estimators.
 struct ComparedRun {
   std::filesystem::path folder;  ///< "": the run has no folder
   RunStatus status = RunStatus::kOk;

@@ -111,7 +111,7 @@ Config WithVariant(const Config& config, const Variant& variant, const std::stri
   return extended;
 }
 
-/// Returns the message of an error without its place and the expected value.
+/// Returns the message of an error without the place and the expected value.
 std::string ReasonOf(const Error& error) {
   std::string reason = error.what();
   reason = reason.substr(0, reason.find('\n'));
@@ -189,7 +189,7 @@ ComparedExperiment Build(const Config& config, const PluginHost& host,
   if (filter < 0) return compared;
   compared.filter = compared.experiment.estimators[static_cast<std::size_t>(filter)].name;
   if (!options.decompose) return compared;
-  std::map<std::string, std::vector<std::string>> left_out;  // by reason
+  std::map<std::string, std::vector<std::string>> left_out;  // key: reason
   for (const Variant& variant : Variants()) {
     const std::vector<EstimatorSpec>& estimators = compared.experiment.estimators;
     const EstimatorSpec& filter_spec = estimators[static_cast<std::size_t>(filter)];

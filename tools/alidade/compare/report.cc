@@ -38,7 +38,7 @@ struct Column {
   std::map<std::string, Ratio> ratios = {};
 };
 
-/// Formats a number as in the other rows.
+/// Formats a number in the same way as the rows of metrics.
 std::string CellOf(double value) {
   RunResult result;
   result.estimators.resize(1);
@@ -64,7 +64,7 @@ std::string RatioText(const Ratio& ratio) {
 
 /// Returns the rows with the ratios of a metric.
 std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKind& kind) {
-  std::map<std::string, TableRow> rows;  // by key
+  std::map<std::string, TableRow> rows;  // key: key of the ratio
   for (const Column& column : columns) {
     for (const auto& [key, ratio] : column.ratios) {
       const MetricKey parsed = MetricKey::Parse(key);

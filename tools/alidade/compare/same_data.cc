@@ -14,14 +14,14 @@ namespace fs = std::filesystem;
 /// Consecutive rows of measurements.csv with equal timestamps.
 struct TimestampRows {
   std::string t_s;                ///< timestamp as in the file; "": the end of the file
-  std::vector<std::string> rows;  ///< sorted by stream name, the order in which they are hashed
+  std::vector<std::string> rows;  ///< sorted by the name of the stream, as for the hash
 };
 
 /// Reader of measurements.csv that groups the rows by timestamp.
 class MeasurementsFile {
  public:
   explicit MeasurementsFile(const fs::path& folder) : stream_(folder / "measurements.csv") {
-    ReadRow();  // header
+    ReadRow();  // skips the header
     ReadRow();
   }
   bool is_open() const { return stream_.is_open(); }
@@ -47,7 +47,7 @@ class MeasurementsFile {
   }
 
   std::ifstream stream_;
-  std::string row_;  ///< the next row
+  std::string row_;  ///< next row of the file
 };
 
 /// Returns the timestamp of rows as text for messages.

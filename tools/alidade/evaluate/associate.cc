@@ -22,8 +22,7 @@ double DoubleSeconds(Timestamp timestamp) {
 }
 
 /// Returns |a - b|, computed with doubles as in evo. The resolution is 0.2 us for a clock that
-/// counts from 1970. If a timestamp lies midway between two others, the same one is nearer as in
-/// evo.
+/// counts from 1970. If a timestamp lies midway between two others, rounding decides, as in evo.
 double TimeDistance(Timestamp a, Timestamp b) {
   return std::abs(DoubleSeconds(a) - DoubleSeconds(b));
 }

@@ -57,8 +57,8 @@ ErrorPose RelativeError(const Trajectory& reference, const Trajectory& estimate,
           AngleOf(relative_rotation(reference).conjugate() * relative_rotation(estimate))};
 }
 
-/// Computes the distance of each pose from the first pose: frames, metres along the trajectory, rad
-/// for both units of angle, or ns. For the unit of seconds the distance is in ns, which are exact.
+/// Computes the distance of each pose from the first pose: in frames, metres along the trajectory,
+/// rad or ns. Both units of angle use rad. The unit of seconds uses ns, which are exact.
 std::vector<double> Progress(const Trajectory& t, DeltaUnit unit) {
   std::vector<double> progress = {0.0};
   for (int i = 1; i < t.size(); ++i) {

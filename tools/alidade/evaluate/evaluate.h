@@ -32,8 +32,8 @@ const char* ToString(Alignment alignment);
 Trajectory operator*(const Similarity& reference_from_estimate, const Trajectory& estimate);
 
 /// Computes the transformation of `estimate` to `reference` from the first `poses` poses of both
-/// (0: all poses). Pose i of both trajectories must match. Errors: kBadData if there are fewer than
-/// 3 poses. For a scale also kBadData if all positions are at one point or are uncorrelated.
+/// (0: all poses). Pose i of both trajectories must match. Error: kBadData if there are fewer than
+/// 3 poses. An alignment with scale also fails if all positions are at one point or uncorrelated.
 Similarity Align(Alignment alignment, const Trajectory& reference, const Trajectory& estimate,
                  int poses = 0);
 
@@ -111,7 +111,7 @@ struct PoseErrors {
 /// Statistics of the NEES e' C^-1 e / dof over the poses whose covariance C is regular.
 struct Nees {
   int poses = 0;
-  double mean = 0.0;      ///< expected value: 1
+  double mean = 0.0;      ///< mean of the NEES; expected value: 1
   double within95 = 0.0;  ///< share with e' C^-1 e <= chi2(0.95, dof); expected value: 0.95
   int dof = 3;            ///< number of axes with uncertainty in at least one pose
 };
@@ -151,12 +151,13 @@ struct Evaluation {
   Similarity alignment;
   std::vector<std::pair<int, int>> pairs;  ///< pairs of the relative errors
   std::vector<PoseErrors> absolute, relative;
-  std::optional<double> sim3_scale;   ///< scale of kSim3, if it is determined
-  std::optional<double> scale_drift;  ///< (scale of the second half) / (scale of the first) - 1
+  std::optional<double> sim3_scale;  ///< scale of kSim3, if it is determined
+  std::optional<double>
+      scale_drift;  ///< (scale of the second half) / (scale of the first half) - 1
   std::optional<Nees> position_nees, orientation_nees;
   std::string nees_withheld;  ///< reason for a missing NEES, if the estimate has covariances
   std::vector<InnovationStatistics> innovations;
-  std::vector<std::string> warnings;  ///< each a single line
+  std::vector<std::string> warnings;  ///< warnings, each a single line
   std::string error;  ///< reason why there are no results, or ""; set by the caller of Evaluate
 };
 

@@ -171,7 +171,7 @@ class TrajectoryReader {
   }
 
   void AddPosition(const Eigen::Vector3d& position) {
-    constexpr double kMaxCoordinate = 1e15;  // m, at which the spacing of doubles is 0.1 m
+    constexpr double kMaxCoordinate = 1e15;  // m; the distance of adjacent doubles is then 0.1 m
     if (!(position.cwiseAbs().maxCoeff() <= kMaxCoordinate))
       rows_.FailLine("a coordinate is beyond 1e15 m", "a position in metres");
     positions_.push_back(position);

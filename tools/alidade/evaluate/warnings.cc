@@ -26,7 +26,7 @@ constexpr double kMaxScaleError = 0.1;    ///< relative deviation of the scale f
 constexpr double kMinLength = 0.5;        ///< matched length / length of the reference
 constexpr double kMaxErrorRatio = 10.0;   ///< error without alignment / error with alignment
 constexpr double kMinBodyTurnDeg = 10.0;  ///< a larger common turn is not an estimation error
-constexpr double kMaxRemainder = 0.25;    ///< error after an explanation / error before it
+constexpr double kMaxRemainder = 0.25;    ///< remaining error / error, for an accepted explanation
 constexpr const char* kEurocTruth = "state_groundtruth_estimate0";
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 

@@ -31,7 +31,7 @@ inline void WriteFinite(double value, CsvFile& file) {
   std::isfinite(value) ? file.Number(value) : file.Empty();
 }
 
-// measurements.csv
+// Columns of measurements.csv.
 
 struct MeasurementLayout {
   std::size_t width, known_width;  ///< numbers of columns that the widest stream needs
@@ -70,7 +70,7 @@ inline constexpr std::array kMeasurementColumns =
          "`known0`, `known1`, ..."},
     });
 
-// truth.csv
+// Columns of truth.csv.
 
 struct TruthLayout {
   std::vector<StreamInfo> truths;
@@ -99,7 +99,7 @@ inline constexpr std::array kTruthColumns = std::to_array<ColumnInfo<TruthLayout
      "`block.element`"},
 });
 
-// expected.csv
+// Columns of expected.csv.
 
 struct ExpectedLayout {
   std::size_t width;
@@ -123,7 +123,7 @@ inline constexpr std::array kExpectedColumns =
          "`v0`, `v1`, ..."},
     });
 
-// implied_states.csv
+// Columns of implied_states.csv.
 
 struct ImpliedLayout {
   std::vector<Column> blocks;  ///< one column for each block
@@ -146,8 +146,8 @@ inline constexpr std::array kImpliedColumns = std::to_array<ColumnInfo<ImpliedLa
      [](const ImpliedLayout& layout) { return layout.blocks; }, "`block`"},
 });
 
-// NAME/estimates.csv and NAME/errors.csv. The first column is the timestamp. The columns below
-// follow for each block.
+// Columns of NAME/estimates.csv and NAME/errors.csv: the timestamp, then the columns below for each
+// block.
 
 inline const Column kTimeColumn{"t_s", "s", "t_s"};
 
@@ -206,11 +206,11 @@ struct BlockColumnInfo {
   const char* quantity;
   const char* names;                         ///< names of the columns, for the documentation
   const char* unit;                          ///< for the documentation
-  const char* meaning;                       ///< for the documentation, in Markdown
+  const char* meaning;                       ///< meaning for the documentation, in Markdown
   std::size_t (BlockLayout::*size)() const;  ///< number of columns
   std::vector<Column> (*columns)(const BlockLayout& block);
   std::vector<double> (*numbers)(const BlockLayout& block,
-                                 const BlockRow& row);  ///< empty result: empty cells
+                                 const BlockRow& row);  ///< an empty result leaves the cells empty
 };
 
 /// Returns a column for each tangent element of a block. The name of a column is `prefix` and the
@@ -277,7 +277,7 @@ void WriteCells(const std::array<BlockColumnInfo, n>& table, const BlockLayout& 
   }
 }
 
-// NAME/innovations.csv
+// Columns of NAME/innovations.csv.
 
 struct InnovationLayout {
   std::size_t width;  ///< size of the widest measurement
@@ -343,10 +343,10 @@ inline constexpr std::array kInnovationColumns = std::to_array<
      "`r0`, `r1`, ..."},
 });
 
-// NAME/gains.csv
+// Columns of NAME/gains.csv.
 
 struct GainLayout {
-  std::vector<Column> elements;  ///< `target.depth<-disparity`
+  std::vector<Column> elements;  ///< names such as `target.depth<-disparity`
 };
 struct GainRow {
   Timestamp timestamp;
@@ -369,7 +369,7 @@ inline constexpr std::array kGainColumns = std::to_array<ColumnInfo<GainLayout, 
      [](const GainLayout& layout) { return layout.elements; }, "`block.element<-measured`"},
 });
 
-// NAME/reprojection.csv, NAME/events.csv, NAME/landmarks.csv, timing.csv
+// Columns of NAME/reprojection.csv, NAME/events.csv, NAME/landmarks.csv and timing.csv.
 
 struct NoLayout {};
 

@@ -14,7 +14,7 @@ namespace alidade::internal {
 /// Column of a csv file in a run folder.
 struct Column {
   std::string name;
-  std::string unit;          ///< "" if there is no unit, or if it depends on the row
+  std::string unit;          ///< "" if there is no unit, or if the unit depends on the row
   std::string quantity;      ///< ColumnInfo::quantity of the entry in the table
   std::string subject = {};  ///< block, sensor or estimator of the column; may be empty
 };
@@ -25,7 +25,7 @@ template <class Layout, class Row>
 struct ColumnInfo {
   const char* quantity;  ///< quantity, and name of a single column
   const char* unit;      ///< unit of a single column; otherwise only for the documentation
-  const char* meaning;   ///< for the documentation, in Markdown
+  const char* meaning;   ///< meaning for the documentation, in Markdown
   void (*write)(const Layout& layout, const Row& row, CsvFile& file);
   std::vector<Column> (*columns)(const Layout& layout) = nullptr;  ///< null: a single column
   const char* names = "";  ///< names of several columns, for the documentation

@@ -5,7 +5,7 @@
 /// generates the source.
 namespace alidade::internal {
 
-extern const char* const kReportCss;    ///< report.css
-extern const char* const kFigureStyle;  ///< style.gp
+extern const char* const kReportCss;    ///< text of report.css
+extern const char* const kFigureStyle;  ///< text of style.gp
 
 }  // namespace alidade::internal

@@ -36,7 +36,7 @@ struct Series {
   std::vector<SeriesBlock> blocks;
   std::vector<Timestamp> timestamps;
   std::vector<double> values;  ///< N numbers for each timestamp; NaN if a block has no value
-  /// Covariances of each timestamp. If `joint`, the lower triangle of P row by row, otherwise the
+  /// Covariances at each timestamp: if `joint`, the lower triangle of P row by row, otherwise the
   /// diagonal of P. Elements of blocks without covariance are NaN.
   std::vector<double> covariances;
   bool joint = true;

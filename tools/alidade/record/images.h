@@ -24,7 +24,7 @@ class ImageWriter {
                    const std::vector<std::array<double, 2>>& pixels) = 0;
   /// Adds an image without drawing on it. All images must have the same size.
   virtual void Add(std::int64_t number, Timestamp timestamp, const GreyImage& image) = 0;
-  /// Draws the image of a frame with its marked features, and the estimate next to it.
+  /// Draws the image of a frame with the marked features, and draws the estimate next to the image.
   virtual void Add(const RunView& view) = 0;
   /// Completes the output. Error: kIo.
   virtual void Close() = 0;
@@ -37,7 +37,7 @@ struct ImageArguments {
   /// must exist.
   std::filesystem::path path;
   std::string shown;  ///< path as it appears in messages
-  int width, height;  ///< px; size of images that are drawn from points
+  int width, height;  ///< size of images that are drawn from points, px
 };
 
 inline constexpr const char* kImageWriterKind = "image writer";

@@ -26,7 +26,7 @@ class LogFile {
   void RecordFailure(const Error& error);
 
   const std::thread::id thread_ = std::this_thread::get_id();
-  std::unique_ptr<OutputFile> file_;  ///< null: closed or failed
+  std::unique_ptr<OutputFile> file_;  ///< null: the file is closed, or a write has failed
   std::string failure_;               ///< reason of the failure
   std::optional<LogSubscription> subscription_;
 };

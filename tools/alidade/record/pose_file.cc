@@ -76,7 +76,7 @@ PoseFile::PoseFile(const OutputFolder& folder, const std::string& name, const Po
 void PoseFile::AppendPose(std::string& row, Timestamp timestamp, const double* position,
                           const double* orientation) const {
   Eigen::Vector3d r = Eigen::Vector3d::Zero();
-  Eigen::Vector4d q = Eigen::Vector4d::Zero();  // w x y z
+  Eigen::Vector4d q = Eigen::Vector4d::Zero();  // order: w x y z
   if (place_.planar) {
     r.head<2>() << position[0], position[1];
     q << std::cos(0.5 * orientation[0]), 0.0, 0.0, std::sin(0.5 * orientation[0]);

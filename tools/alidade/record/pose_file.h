@@ -24,18 +24,21 @@ struct PosePlace {
 std::optional<PosePlace> FindPose(const std::vector<StreamInfo>& values);
 
 /// Writer of a pose file in TUM format, `t x y z qx qy qz qw`, with or without covariances. A
-/// planar pose has z = 0, rotates about z, and has zero variance in the other axes.
+/// planar pose is written with z = 0, with a rotation about z, and with zero variance in the other
+/// axes.
 class PoseFile {
  public:
-  /// Creates the file with a comment line that names the columns. Errors: kCannotCreate, kIo.
+  /// Creates the file and writes a comment line with the names of the columns. Errors:
+  /// kCannotCreate, kIo.
   PoseFile(const OutputFolder& folder, const std::string& name, const PosePlace& place,
            bool with_covariances = false);
 
   /// Writes a pose. The orientation is the quaternion w x y z or the planar angle in rad. Error:
   /// kIo.
   void Add(Timestamp timestamp, const double* position, const double* orientation);
-  /// Writes a pose with covariances. That of the position is in the world frame, m^2, that of the
-  /// orientation in the body frame, rad^2. A covariance that is not finite is written as zeros.
+  /// Writes a pose with covariances. The covariance of the position is in the world frame, m^2. The
+  /// covariance of the orientation is in the body frame, rad^2. A covariance that is not finite is
+  /// written as zeros.
   void Add(Timestamp timestamp, const double* position, const double* orientation,
            const Eigen::MatrixXd& position_covariance,
            const Eigen::MatrixXd& orientation_covariance);

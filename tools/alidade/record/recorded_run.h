@@ -8,11 +8,11 @@
 #include "alidade/base/timestamp.h"
 #include "alidade/record/estimate_series.h"
 
-/// Contents of the csv files of a run folder, for figures. Columns are identified by name.
+/// Description of the csv files of a run folder, for figures. Columns are identified by name.
 namespace alidade::internal {
 
 /// Element of a block in `NAME/estimates.csv`. Value and truth are ambient elements; sigma
-/// belongs to a tangent element. Only elements of vectors and angles are both.
+/// belongs to a tangent element. In vectors and angles, each element is ambient and tangent.
 struct RecordedElement {
   std::string name;  ///< name of the element and of the column of the value
   std::string unit;

@@ -260,7 +260,7 @@ void Recorder::Finish(const RunResult& result) {
     try {
       const std::string reason = CaughtFailure().reason;
       impl_->folder.Write(kRunFile, internal::UnfinishedRunJson("failed", reason));
-    } catch (const Error&) {  // the disk may be full
+    } catch (const Error&) {  // ignored: the disk may be full
     }
     throw;
   }

@@ -17,7 +17,7 @@ namespace alidade {
 enum class Mark {
   kAccepted,
   kRejected,  ///< rejected by the gate or by outlier rejection
-  kNew,       ///< used for an initialisation, or waiting for one
+  kNew,       ///< used for an initialisation, or stored for a later one
   kLost,      ///< measured in the previous frame, but not in this frame
   kUnused,    ///< not used by a sensor
 };
@@ -80,7 +80,7 @@ struct RunView {
   std::vector<ViewElement> elements;
   int landmarks = -1;  ///< number of landmarks in the state; -1: the estimator has no landmarks
   std::optional<ViewMap> map;
-  std::optional<ViewSeries> series;  ///< shown if there is no map
+  std::optional<ViewSeries> series;  ///< series that is shown if there is no map
 };
 
 }  // namespace alidade

@@ -46,7 +46,7 @@ struct RunViewer::Impl {
   std::vector<int> truth_of;  ///< truth of each block of the problem; -1: none
   std::optional<internal::PosePlace> pose;
   std::vector<std::unique_ptr<internal::PartialFile>>
-      videos;  ///< declared first: must outlive the writers
+      videos;  ///< declared before the writers, to outlive them
   std::vector<std::unique_ptr<ImageWriter>> writers;
   RunView view;
   internal::FeatureTrails trails;

@@ -25,7 +25,7 @@ class SourceFiles {
  public:
   SourceFiles(const OutputFolder& folder, const Experiment& experiment, RunColumns& run_columns);
 
-  /// Error: kIo.
+  /// Writes the rows of a frame. Error: kIo.
   void Add(const SourceFrame& frame);
   void Close();
   const TruthLayout& truth_layout() const { return truth_layout_; }
@@ -52,7 +52,7 @@ class SourceFiles {
   TruthLayout truth_layout_;
   std::vector<std::int64_t> stream_rows_;    ///< rows of each stream in measurements.csv
   std::vector<std::int64_t> expected_rows_;  ///< rows of each stream in expected.csv
-  std::map<int, Expectation> expectations_;  ///< by index of the stream
+  std::map<int, Expectation> expectations_;  ///< key: index of the stream
   std::vector<Inverse> inverses_;
   MeasurementLayout layout_{1, 0};
   ImpliedLayout implied_layout_;

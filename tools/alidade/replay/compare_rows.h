@@ -12,7 +12,7 @@ namespace alidade::internal {
 
 /// First difference between two files.
 struct RowDifference {
-  std::int64_t line = 0, column = 0;  ///< position, counted from 1
+  std::int64_t line = 0, column = 0;  ///< position in the files, counted from 1
   /// Cell of each file at that position, truncated if it is long. It is empty if the cell is not
   /// printable text.
   std::string recorded, current;

@@ -28,8 +28,8 @@ struct CommandInputs {
 };
 
 /// Returns each plugin file that runs of these configs use. A plugin is used if any `model` or
-/// `type` in a config is the name of a model, source or estimator of that plugin. Overrides count,
-/// too.
+/// `type` in a config is the name of a model, source or estimator of that plugin. Overrides are
+/// included.
 std::vector<std::filesystem::path> FindUsedPlugins(const std::vector<Config>& configs,
                                                    const PluginHost& host);
 

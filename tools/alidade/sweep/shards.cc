@@ -160,7 +160,7 @@ void AddRuns(const ShardFolder& folder, const SeedRange& seeds,
   if (std::getline(stream, line)) fail("is a line after the last run");
 }
 
-/// Returns a SweepResult for each value, which does not contain runs yet. `summary` is the
+/// Returns a SweepResult without runs for each value. `summary` is the
 /// sweep.json of any shard.
 std::vector<SweepResult> EmptyResults(const Json& summary, std::int64_t runs,
                                       std::uint64_t first_seed) {

@@ -84,7 +84,7 @@ struct SweepRun {
   std::string reason;
   std::vector<SweepRow> estimators;
   std::vector<FrameErrors> reprojection = {};  ///< for the first 500 frames; only in a varied sweep
-  bool withheld = false;                       ///< true: without a reference for the errors
+  bool withheld = false;  ///< true: no comparison with the reference, see RunResult
 
   /// Replaces the lists of names of all estimators by equal lists in the pool.
   void ShareNames(SharedNames& pool) {
@@ -142,9 +142,9 @@ struct VariedSweep {
 };
 
 /// Executes a sweep of `config` for each value of the variation. `options.progress` counts the runs
-/// of all values. Errors, before the first run: kBadConfig if the key is `source.seed`, if its
-/// parent map does not exist, or if the values lead to different estimators; those of
-/// BuildExperiment for each value.
+/// of all values. Errors before the first run: kBadConfig if the key is `source.seed`, if
+/// the parent map of the key does not exist, or if the values lead to different estimators; those
+/// of BuildExperiment() for each value.
 VariedSweep SweepVariation(const Config& config, const PluginHost& host,
                            const SweepOptions& options, const Variation& variation);
 
@@ -180,8 +180,8 @@ class SweepFolder {
     bool resume = false;  ///< true: continues the sweep in `FOLDER.partial` if it exists
     bool shard = false;   ///< true: the sweep is a shard
   };
-  /// Creates or continues the folder. Errors: those of OutputFolder; kCannotCreate if the sweep to
-  /// be resumed has another config or other inputs.
+  /// Creates the folder, or continues the sweep in it. Errors: those of OutputFolder; kCannotCreate
+  /// if the sweep in the folder has another config or other inputs.
   SweepFolder(const Options& options, const Config& config);
   /// Creates a folder without inputs.json. The sweep cannot be resumed, because no run is recorded
   /// before Write().
@@ -193,7 +193,7 @@ class SweepFolder {
   /// Returns the record of finished runs for SweepOptions. Returns null if the folder does not
   /// contain inputs.json.
   internal::FinishedRuns* finished();
-  /// Returns the folder, for additional files.
+  /// Returns the output folder, to which the caller may add files.
   const internal::OutputFolder& files() const;
   /// Writes an additional file that contains `text`. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, const std::string& text);

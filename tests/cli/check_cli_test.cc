@@ -20,7 +20,7 @@ TEST_F(CheckProgram, SaysALineForEachCheckAndEndsWithZero) {
   EXPECT_EQ(outcome.err, "");
   EXPECT_TRUE(outcome.out.starts_with("stereo_disparity (sensor of /")) << outcome.out;
   for (const char* line : {"\n  ok       create ", "\n  ok       jacobian ",
-                           "\n  skipped  step           not a motion model\n"}) {
+                           "\n  skipped  step           the model is not a motion model\n"}) {
     EXPECT_TRUE(Contains(outcome.out, line)) << line << outcome.out;
   }
   EXPECT_FALSE(Contains(outcome.out, "FAIL"));

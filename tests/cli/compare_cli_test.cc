@@ -444,7 +444,8 @@ TEST_F(CompareCli, AddsNothingBeyondTheBudget) {
   EXPECT_TRUE(Contains(little.out, " s, the budget is 1e-09 s")) << little.out;
   EXPECT_FALSE(Contains(little.out, "added '")) << little.out;
   const std::string shown = little.out.substr(little.out.find("Error decomposition"));
-  EXPECT_TRUE(Contains(shown, "the budget of 1e-09 s excludes the estimators named above"))
+  EXPECT_TRUE(
+      Contains(shown, "the budget of 1e-09 s excludes the estimators that are listed as left out"))
       << shown;
   const Outcome much = Call({"compare", "config.yaml", "--budget", "1e6", "-o", "much"});
   ASSERT_EQ(much.code, 0) << much.err;
@@ -488,7 +489,7 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
   fails({"compare", "."}, 66, "run.json: cannot be read");
   fs::create_directory(folder_ / "swept");
   Write("swept/sweep.json", "{}");
-  fails({"compare", "swept"}, 65, "swept: is the folder of a sweep; expected folders of");
+  fails({"compare", "swept"}, 65, "swept: is the folder of a sweep; expected folders that");
   fs::create_directory(folder_ / "run.partial");
   Write("run.partial/run.json", "{\"status\": \"running\"}");
   fails({"compare", "run.partial"}, 65, "run.partial: is incomplete; expected a ");

@@ -68,7 +68,7 @@ TEST(CeresBundle, FindsCamerasPointsAndIntrinsics) {
   ASSERT_EQ(words.size(), 3u);
   EXPECT_EQ(words[0], "gauge: the pose of the first camera and the scale are constant");
   EXPECT_EQ(words[1].find("extent: "), 0u) << words[1];
-  EXPECT_EQ(words[2], "rank: 167 of 168 unknowns: all but the scale are determined");
+  EXPECT_EQ(words[2], "rank: 167 of 168 unknowns: all are determined except the scale");
 }
 
 TEST(CeresBundle, LeavesFixedIntrinsicsAsTheyAre) {
@@ -343,7 +343,7 @@ TEST(CeresBundle, CountsDirectionsThatNothingTells) {
     result.rank = rank;
     return DescribeUndetermined(problem, *sensor, result).back();
   };
-  EXPECT_EQ(last(9), "rank: 9 of 10 unknowns: all but the scale are determined");
+  EXPECT_EQ(last(9), "rank: 9 of 10 unknowns: all are determined except the scale");
   EXPECT_EQ(last(8), "rank: 8 of 10 unknowns; 1 direction besides the scale is undetermined");
   EXPECT_EQ(last(7), "rank: 7 of 10 unknowns; 2 directions besides the scale are undetermined");
   EXPECT_EQ(last(-1), "rank: not computed (the Jacobian is not finite)");

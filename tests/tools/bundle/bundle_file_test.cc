@@ -172,14 +172,15 @@ TEST_F(BundleFiles, RefusesBadBal) {
   std::string text = kBal;
   ExpectBad(text.replace(text.find("100"), 3, "-10"),
             {":9:1: the focal length is not positive", "px above 0"});
-  ExpectBad(kBal + "5\n", {":15:1: the file contains more numbers than its counts announce"});
+  ExpectBad(kBal + "5\n", {":15:1: the file contains additional numbers"});
   for (const char* magic : {"\x1F\x8B\x08", "BZh9",
                             "\xFD"
                             "7zXZ",
                             "\x28\xB5\x2F\xFD"})
     ExpectBad(magic,
               {":1:1: the file is compressed; expected uncompressed text, for example from zcat"});
-  ExpectBad(std::string("1 1 1\0", 6), {":1:1: the file is not text; expected a problem of BAL"});
+  ExpectBad(std::string("1 1 1\0", 6),
+            {":1:1: the file is not text; expected a bundle adjustment problem"});
   ExpectBad("frame,feature,dim,value\n",
             {":1:1: the columns are separated by commas", "--camera FILE"});
 }
@@ -188,7 +189,7 @@ TEST_F(BundleFiles, RefusesBadBundler) {
   ExpectBad("# Bundle file v0.4\n1 1\n",
             {":1:1: '# Bundle file v0.4'; expected # Bundle file v0.3"});
   std::string text = kBundler;
-  ExpectBad(text.replace(text.find("0 -1 0"), 6, "0 -2 0"), {":6:5:", "are not a rotation"});
+  ExpectBad(text.replace(text.find("0 -1 0"), 6, "0 -2 0"), {":6:5:", "are not a rotation matrix"});
   text = kBundler;
   ExpectBad(text.replace(text.find("1 0 42"), 6, "1 1 42"), {"this camera is not registered"});
   text = kBundler;
@@ -208,10 +209,10 @@ TEST_F(BundleFiles, RefusesBadLibmv) {
   bad[1] = 'N';
   ExpectBad(bad, {"byte 1: markers in normalised coordinates"});
   ExpectBad(good.substr(0, good.size() - 2), {"byte 128: the file ends before a marker"});
-  ExpectBad(good + "x", {"byte 130: data after the last marker"});
+  ExpectBad(good + "x", {"byte 130: there are data after the last marker"});
   bad = good;
   bad[bad.size() - 16] = 8;
-  ExpectBad(bad, {"byte 114: a marker in an image that has no camera"});
+  ExpectBad(bad, {"byte 114: the image of the marker has no camera"});
   bad = good;
   bad[5] = static_cast<char>(0x7F), bad[4] = static_cast<char>(0xC0);
   ExpectBad(bad, {"byte 2: intrinsics is not finite"});

@@ -67,9 +67,10 @@ TEST_F(PublicFigures, MonocularDeskIsAsPublishedToTheLastDigit) {
   const Evaluation se3 = Compare(truth, mono, Alignment::kSe3);
   ExpectFigures(se3, 118, "1.000000", "0.939049");
   ASSERT_EQ(se3.warnings.size(), 1u);
-  EXPECT_NE(se3.warnings[0].find("scale 2.228 (error 0.007729 m by sim3, 0.939 m by se3): probably "
-                                 "a run without metric scale; expected -as"),
-            std::string::npos)
+  EXPECT_NE(
+      se3.warnings[0].find("scale 2.228 (error 0.007729 m with sim3, 0.939 m with se3): probably "
+                           "a run without metric scale; expected -as"),
+      std::string::npos)
       << se3.warnings[0];
   const Evaluation sim3 = Compare(truth, mono, Alignment::kSim3);
   ExpectFigures(sim3, 118, "2.228022", "0.007729");

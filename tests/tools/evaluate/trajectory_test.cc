@@ -97,15 +97,15 @@ TEST_F(TrajectoryFiles, KittiTakesItsTimestampsFromTheFileBeside) {
   EXPECT_EQ(Read(rows).timestamps, (std::vector<Timestamp>{5'000'000'000, 6'000'000'000}));
   Write("poses_times.txt", "5\n");
   EXPECT_NE(Refusal(rows).find("poses_times.txt:1: 1 times for 2 poses of "), std::string::npos);
-  EXPECT_NE(Refusal(rows).find("; expected one for each pose"), std::string::npos);
+  EXPECT_NE(Refusal(rows).find("; expected one time for each pose"), std::string::npos);
   // times.txt can belong to several files. The message tells how to give this file times of its
   // own.
   fs::remove(folder_ / "poses_times.txt");
   Write("times.txt", "0\n1\n2\n");
   EXPECT_NE(Refusal(rows).find("times.txt:3: 3 times for 2 poses of "), std::string::npos);
-  EXPECT_NE(
-      Refusal(rows).find("; expected one for each pose, or poses_times.txt in the same folder"),
-      std::string::npos)
+  EXPECT_NE(Refusal(rows).find(
+                "; expected one time for each pose, or poses_times.txt in the same folder"),
+            std::string::npos)
       << Refusal(rows);
   Write("poses_times.txt", "5\n5\n");
   EXPECT_NE(Refusal(rows).find("poses_times.txt:2:1 t: '5' is not after the previous time"),
@@ -250,7 +250,8 @@ TEST_F(TrajectoryFiles, TimestampsOutOfOrderAreSortedAndToldOf) {
 TEST_F(TrajectoryFiles, PosesOfADuplicateTimestampAreAllKeptAndItsLineIsNamed) {
   const std::string text = "1 1 0 0 0 0 0 1\n1 9 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n";
   EXPECT_EQ(WarningsOf(text),
-            "poses.txt:2 t: duplicate timestamp 1.000000 s, the first of 2 such rows; expected "
+            "poses.txt:2 t: duplicate timestamp 1.000000 s, the first of 2 duplicate timestamps; "
+            "expected "
             "each timestamp once; all poses are kept\n");
   EXPECT_EQ(Read(text).positions.row(0), Eigen::RowVector4d(1, 9, 2, 9));
   EXPECT_EQ(Read(text).timestamps.size(), 4u);

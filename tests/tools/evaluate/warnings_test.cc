@@ -58,7 +58,8 @@ TEST(EvaluationWarnings, AScaleFarFromOneIsNoMetricScale) {
   const Trajectory mono = Estimate(Inverse(known) * Curve(60));
   const std::string warnings = WarningsOf(Curve(60), mono, Aligned(Alignment::kSe3));
   EXPECT_TRUE(warnings.starts_with("estimate.tum: scale 2.228 (error 0.0")) << warnings;
-  EXPECT_TRUE(warnings.ends_with("m by se3): probably a run without metric scale; expected -as\n"))
+  EXPECT_TRUE(
+      warnings.ends_with("m with se3): probably a run without metric scale; expected -as\n"))
       << warnings;
   EXPECT_EQ(WarningsOf(Curve(60), mono, Aligned(Alignment::kSim3)), "");
 }
@@ -86,7 +87,8 @@ TEST(EvaluationWarnings, AConstantTimeOffsetIsToldWithTheOptionThatTakesIt) {
   Trajectory estimate = Estimate(Curve(60));
   for (Timestamp& timestamp : estimate.timestamps) timestamp += 8'000'000;
   EXPECT_EQ(WarningsOf(Curve(60), estimate),
-            "estimate.tum: the median timestamp is 0.008 s after that of the reference; expected "
+            "estimate.tum: in the median, the timestamps are 0.008 s after those of the reference; "
+            "expected "
             "--t-offset -0.008\n");
   EvaluateOptions options;
   options.offset = -8'000'000;
@@ -124,7 +126,8 @@ TEST(EvaluationWarnings, PositionsOnALineDetermineNoTurnAboutIt) {
   estimate.name = "estimate.tum";
   EXPECT_EQ(WarningsOf(testing::Line(60, 0.5), estimate, Aligned(Alignment::kSe3)),
             "estimate.tum: positions of the estimate or the reference are collinear: the rotation "
-            "of se3 about the line is arbitrary, and so are orientation errors; expected no "
+            "of se3 about the line is arbitrary, so orientation errors are arbitrary as well; "
+            "expected no "
             "alignment, --align-origin or --align-mode yaw for orientation errors\n");
   EXPECT_EQ(WarningsOf(testing::Line(60, 0.5), estimate, Aligned(Alignment::kYaw)), "");
 }

@@ -72,7 +72,7 @@ void ReadBundlerCamera(BundleCursor& cursor, BundleFile& file) {
   const bool missing = lens[0] == 0.0 && r.isZero();  // the image is not registered
   constexpr double kRounding = 1e-3;
   if (!missing && (!(r * r.transpose()).isIdentity(kRounding) || !(r.determinant() > 0.0)))
-    cursor.Fail("the 9 numbers that end here are not a rotation", "an orthonormal matrix");
+    cursor.Fail("the 9 numbers that end here are not a rotation matrix", "an orthonormal matrix");
   cursor.Numbers("translation of a camera", 3, pose.data() + 9);
   const Eigen::Quaterniond q =
       missing ? Eigen::Quaterniond::Identity() : Eigen::Quaterniond(Eigen::Matrix3d(r));

@@ -306,7 +306,7 @@ std::vector<std::string> DescribeUndetermined(const BundleProblem& problem,
   } else {
     lines.push_back(
         "rank: " + std::to_string(result.rank) + " of " + std::to_string(result.unknowns) +
-        " unknowns: " + (mono ? "all but the scale are determined" : "all are determined"));
+        " unknowns: " + (mono ? "all are determined except the scale" : "all are determined"));
   }
   return lines;
 }

@@ -34,7 +34,8 @@ void RejectBinary(const std::string& name, std::string_view beginning) {
                "uncompressed text, for example from zcat FILE | alidade bundle -");
   }
   if (beginning.find('\0') != beginning.npos)
-    FailFormat(name, "the file is not text", "a problem of BAL, Bundler or libmv");
+    FailFormat(name, "the file is not text",
+               "a bundle adjustment problem in the format BAL, Bundler or libmv");
 }
 
 /// Reads a whole file or pipe, or standard input if `file` is `-`. Errors: kInputMissing; kIo if a
@@ -70,7 +71,8 @@ BundleFile ReadBundle(const std::filesystem::path& file) {
   const std::string text = ReadAll(file);
   const std::string_view view = text;
   if (view.find_first_not_of(" \t\r\n") == view.npos)
-    FailFormat(name, "the file is empty", "a problem of BAL, Bundler or libmv");
+    FailFormat(name, "the file is empty",
+               "a bundle adjustment problem in the format BAL, Bundler or libmv");
   if (IsLibmv(view)) return internal::ReadLibmv(view, name);
   if (view.starts_with(internal::kBundlerHeader)) return internal::ReadBundler(view, name);
   if (view.starts_with("# Bundle")) {

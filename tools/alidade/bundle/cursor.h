@@ -54,8 +54,7 @@ class BundleCursor {
   void ExpectEnd(const char* quantity) {
     SkipBlanks();
     word_start_ = offset_;
-    if (offset_ < text_.size())
-      Fail("the file contains more numbers than its counts announce", quantity);
+    if (offset_ < text_.size()) Fail("the file contains additional numbers", quantity);
   }
   /// Skips the remainder of the line.
   void SkipLine() {

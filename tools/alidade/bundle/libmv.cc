@@ -38,7 +38,7 @@ class BinaryReader {
     return count;
   }
   void ExpectEnd() const {
-    if (offset_ != bytes_.size()) Fail(offset_, "data after the last marker");
+    if (offset_ != bytes_.size()) Fail(offset_, "there are data after the last marker");
   }
   std::size_t offset() const { return offset_; }
   [[noreturn]] void Fail(std::size_t offset, const std::string& problem) const {
@@ -67,13 +67,13 @@ void ReadCamera(BinaryReader& bytes, BundleFile& file, std::map<std::int64_t, in
   const std::int32_t image = bytes.Integer("the image of a camera");
   const auto number = static_cast<int>(file.problem.cameras.size());
   if (!index.emplace(image, number).second)
-    bytes.Fail(offset, "a second camera for image " + std::to_string(image));
+    bytes.Fail(offset, "there is a second camera for image " + std::to_string(image));
   std::vector<double> pose(12);
   bytes.Numbers("rotation and translation of a camera", 12, pose.data());
   const Eigen::Map<const Eigen::Matrix3d> r(pose.data());  // column-major
   constexpr double kRounding = 1e-3;
   if (!(r * r.transpose()).isIdentity(kRounding) || !(r.determinant() > 0.0))
-    bytes.Fail(offset + 4, "the 9 numbers are not a rotation");
+    bytes.Fail(offset + 4, "the 9 numbers are not a rotation matrix");
   const Eigen::Quaterniond q{Eigen::Matrix3d(r)};
   const double wxyz[4] = {q.w(), q.x(), q.y(), q.z()};
   file.problem.cameras.push_back(CameraFromTransform(wxyz, pose.data() + 9, false));
@@ -86,7 +86,7 @@ void ReadPoint(BinaryReader& bytes, BundleFile& file, std::map<std::int64_t, int
   const std::int32_t track = bytes.Integer("the track of a point");
   const auto number = static_cast<int>(file.problem.points.size());
   if (!index.emplace(track, number).second)
-    bytes.Fail(offset, "a second point for track " + std::to_string(track));
+    bytes.Fail(offset, "there is a second point for track " + std::to_string(track));
   bytes.Numbers("a point", 3, file.problem.points.emplace_back().data());
   file.point_ids.push_back(track);
 }
@@ -110,7 +110,8 @@ void AppendFloats(std::string& bytes, const double* values, std::size_t count) {
 BundleFile ReadLibmv(std::string_view text, const std::string& name) {
   BinaryReader bytes(text, name);
   if (text[1] != 'P')
-    bytes.Fail(1, "markers in normalised coordinates ('N'); expected markers in pixels ('P')");
+    bytes.Fail(1,
+               "the markers are in normalised coordinates ('N'); expected markers in pixels ('P')");
   BundleFile file;
   file.format = BundleFormat::kLibmv;
   BundleProblem& problem = file.problem;
@@ -128,8 +129,8 @@ BundleFile ReadLibmv(std::string_view text, const std::string& name) {
     const std::size_t offset = bytes.offset();
     const auto camera = cameras.find(bytes.Integer("the image of a marker"));
     const auto point = points.find(bytes.Integer("the track of a marker"));
-    if (camera == cameras.end()) bytes.Fail(offset, "a marker in an image that has no camera");
-    if (point == points.end()) bytes.Fail(offset + 4, "a marker of a track that has no point");
+    if (camera == cameras.end()) bytes.Fail(offset, "the image of the marker has no camera");
+    if (point == points.end()) bytes.Fail(offset + 4, "the track of the marker has no point");
     BundleObservation& observation = problem.observations.emplace_back();
     observation.camera = camera->second;
     observation.point = point->second;

@@ -38,7 +38,7 @@ std::string DefectOfR(const MatrixXd& l, const Space& z) {
   const std::vector<std::string> names = TangentNames({z});
   for (Eigen::Index i = 0; i < r.rows(); ++i) {
     if (!(r(i, i) > 0.0)) {
-      return "R is singular: no noise on " + names[static_cast<std::size_t>(i)];
+      return "R is singular: the noise is 0 for " + names[static_cast<std::size_t>(i)];
     }
   }
   const Eigen::VectorXd scale = r.diagonal().array().rsqrt();
@@ -264,12 +264,12 @@ Finding CheckInitialise(Context& context) {
               text);
   }
   if (!worst.failure.empty()) return Fail(worst.failure);
-  if (inverted == 0) return Skip("Initialise succeeds at none of the states");
+  if (inverted == 0) return Skip("Initialise fails at all states");
   return Ok("Predict reproduces the measurement at " + std::to_string(inverted) + " states");
 }
 
 Finding CheckStep(Context& context) {
-  if (context.model().is_sensor()) return Skip("not a motion model");
+  if (context.model().is_sensor()) return Skip("the model is not a motion model");
   const Function& f = context.main();
   const std::vector<std::string> names = TangentNames(f.outputs);
   const bool stationary = (context.model().instance->capabilities() & ALIDADE_STATIONARY) != 0;
@@ -318,7 +318,7 @@ Finding CheckStep(Context& context) {
 // defect vanishes for dt -> 0.
 Finding CheckNoiseKind(Context& context) {
   constexpr double kMaxDefect = 0.1;
-  if (context.model().is_sensor()) return Skip("not a motion model");
+  if (context.model().is_sensor()) return Skip("the model is not a motion model");
   if (context.model().Find("SqrtQ") == nullptr) return Skip("the model has no noise input");
   const bool discrete = (context.model().instance->capabilities() & ALIDADE_DISCRETE_NOISE) != 0;
   const std::string kind = discrete ? "discrete" : "continuous";
@@ -341,12 +341,12 @@ Finding CheckNoiseKind(Context& context) {
   const double other_defect = discrete ? worst.continuous : worst.discrete;
   if (declared_defect <= kMaxDefect) {
     return Ok(kind +
-              " noise: the covariance over two parts of dt equals that over dt, up to "
+              " noise: the covariance over two parts of dt equals the covariance over dt, up to "
               "integration error");
   }
   return Fail("declares " + kind +
-              " noise, but for small dt the covariance over two parts of dt differs from that over "
-              "dt by " +
+              " noise, but for small dt the covariance over two parts of dt differs from the "
+              "covariance over dt by " +
               std::to_string(std::lround(100.0 * declared_defect)) + " %, at " + worst_call + "; " +
               NoiseKindRemedy(discrete, other_defect <= kMaxDefect));
 }

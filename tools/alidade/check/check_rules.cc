@@ -45,7 +45,7 @@ std::string CodeDefect(const Context& context, const Function& f, std::int32_t c
       const AlidadeInstance& c = context.model().instance->c();
       return c.error_text == nullptr ? std::string() : context.model().instance->error_text();
     }();
-    return "failed: " + (text.empty() ? "the model sets no error text" : text);
+    return "failed: " + (text.empty() ? "the model does not set an error text" : text);
   }
   const bool may_refuse = f.name == "Valid" || f.name == "Initialise";
   if (code == ALIDADE_OK || (code == ALIDADE_INVALID && may_refuse)) return {};
@@ -161,7 +161,7 @@ Finding CheckBounds(Context& context) {
         const Answer answer = context.Call(f, state);
         if (answer.written_input >= 0) {
           const int slot = f.slots[static_cast<std::size_t>(answer.written_input)];
-          return context.CallText(f, state) + ": writes to its input " +
+          return context.CallText(f, state) + ": writes to the input " +
                  context.model().slots[static_cast<std::size_t>(slot)].name;
         }
         for (const auto* buffers : {&answer.outputs, &answer.matrices}) {

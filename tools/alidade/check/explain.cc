@@ -238,7 +238,7 @@ std::string NeedExcitation(const Problem& problem,
 
 std::string Unobservable(const Problem& problem) {
   if (problem.landmarks && !internal::PlaceLandmarks(problem)) {
-    return "  observability depends on the landmarks\n";
+    return "  observability is not analysed: it depends on the landmarks\n";
   }
   if (!internal::IsObservabilityComputed(problem)) {
     return "  observability is not analysed: the state has more than " +

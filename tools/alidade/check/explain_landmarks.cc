@@ -32,7 +32,7 @@ std::vector<TextRow> LandmarkRows(const Problem& problem) {
     add("prior", prior);
   }
   std::string initialise = options.min_observations == 1
-                               ? "at first observation"
+                               ? "at the first observation"
                                : "at observation " + std::to_string(options.min_observations);
   if (options.max_per_frame < LandmarkOptions::kUnlimited) {
     initialise +=

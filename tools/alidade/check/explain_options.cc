@@ -49,7 +49,7 @@ std::string RejectionRecoveryText(const EkfOptions& options, const Problem& prob
     if (std::ranges::none_of(sensor.roles, corrects)) unaffected.push_back(sensor.name);
   }
   std::string after = " after " + std::to_string(options.rejection_recovery_after) +
-                      " rejections of a sensor in a row";
+                      " consecutive rejections of a sensor";
   if (!unaffected.empty()) after += "; no effect for " + Join(unaffected);
   switch (options.rejection_recovery) {
     case RejectionRecovery::kReset:

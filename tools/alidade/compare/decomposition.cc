@@ -167,7 +167,7 @@ std::vector<DecompositionStep> Decompose(const Candidate& filter,
       "full-information filter"));
   steps.push_back(ComputeStep(
       DecompositionKind::kRejected, estimators.accepted, estimators.all_data, with_truth,
-      "the batch of all data or that of the accepted measurements is missing, "
+      "the batch of all data or the batch of the accepted measurements is missing, "
       "{type: BATCH, use: {accepted_by: FILTER}}"));
   const std::int64_t count = filter.measurements(), used = filter.used();
   steps.back().values["measurements"] = SingleValue(static_cast<double>(count));

@@ -156,7 +156,7 @@ void ReadCovariances(const fs::path& file, Series& series) {
   std::vector<double> cells(series.cells() * series.timestamps.size());
   const auto bytes = static_cast<std::streamsize>(8 * cells.size());
   if (fs::file_size(file) != static_cast<std::uintmax_t>(bytes)) {
-    FailFile(file, 0, "the size does not match the rows of estimates.csv");
+    FailFile(file, 0, "the size does not match the number of rows of estimates.csv");
   }
   Open(file).read(reinterpret_cast<char*>(cells.data()), bytes);
   series.covariances = std::move(cells);
@@ -227,7 +227,7 @@ std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
     if (!columns.contains(name)) FailFile(file, 1, std::string("no column '") + name + "'");
   }
   while (rows.Next()) {
-    if (rows.size() < columns.size()) FailFile(file, rows.line(), "too few columns");
+    if (rows.size() < columns.size()) FailFile(file, rows.line(), "there are too few columns");
     if (rows.text(columns.at("status")) == "removed") continue;
     LandmarkEstimate& landmark = map.emplace_back();
     landmark.id = rows.Index(columns.at("id"), "id");
@@ -268,7 +268,7 @@ ComparedRun ReadRun(const fs::path& folder) {
   if (fs::exists(folder / "sweep.json")) {
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{folder.string()}, {}, "is the folder of a sweep",
-                          "folders of `alidade run`"));
+                          "folders that `alidade run` has written"));
   }
   const Json run_json = ReadJson(run_file);
   const JsonNode root(run_json, run_file.string());

@@ -266,7 +266,7 @@ ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHos
   compared.notes.push_back(note);
   if (!beyond.empty()) {
     compared.beyond_budget = "the budget of " + internal::RoundedText(*options.budget_s, 2) +
-                             " s excludes the estimators named above";
+                             " s excludes the estimators that are listed as left out";
   }
   return compared;
 }

@@ -52,7 +52,8 @@ void AddRow(const NumberRows& rows, const Columns& columns, std::map<std::int64_
   if (dof < 1) rows.FailCell(columns.dof, "dof", "is not a positive number", "1 or more");
   const std::size_t max_dof = rows.size() - std::min(rows.size(), std::max(columns.s0, columns.r0));
   if (static_cast<std::uint64_t>(dof) > max_dof)
-    rows.FailLine("there are too few columns for the value of dof", "dof columns of s and of r");
+    rows.FailLine("there are too few columns for the value of dof",
+                  "as many columns of s and of r as dof");
   ++sums.measurements;
   sums.nis += nis / static_cast<double>(dof);
   const auto [limit, is_new] = limits.try_emplace(dof, 0.0);
@@ -81,7 +82,7 @@ InnovationStatistics Finish(const std::string& sensor, const SensorSums& sums) {
 
 std::vector<InnovationStatistics> ReadInnovations(const std::filesystem::path& file) {
   NumberRows rows(file, {}, {});
-  if (!rows.Next()) rows.FailLine("no header line", "innovations.csv of a run folder");
+  if (!rows.Next()) rows.FailLine("the header line is missing", "innovations.csv of a run folder");
   const std::size_t width = rows.size();
   const Columns columns{Find(rows, "sensor"), Find(rows, "landmark"), Find(rows, "outcome"),
                         Find(rows, "dof"),    Find(rows, "nis"),      Find(rows, "s0"),

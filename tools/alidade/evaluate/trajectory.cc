@@ -256,7 +256,7 @@ class TrajectoryReader {
     }
     if (count == 0) return;
     std::string text = "duplicate timestamp " + internal::SecondsText(At(timestamps, first));
-    if (count > 1) text += ", the first of " + std::to_string(count) + " such rows";
+    if (count > 1) text += ", the first of " + std::to_string(count) + " duplicate timestamps";
     Warn(At(lines_, first), "t", text, "each timestamp once; all poses are kept");
   }
 
@@ -307,10 +307,10 @@ void ReadTimes(const std::filesystem::path& times, Trajectory& trajectory) {
   if (std::ssize(trajectory.timestamps) == trajectory.size()) return;
   const std::filesystem::path dedicated = DedicatedTimes(trajectory.name);
   const bool shared = times.filename() != dedicated;
-  rows.FailLine(
-      std::to_string(trajectory.timestamps.size()) + " times for " +
-          std::to_string(trajectory.size()) + " poses of " + trajectory.name,
-      "one for each pose" + (shared ? ", or " + dedicated.string() + " in the same folder" : ""));
+  rows.FailLine(std::to_string(trajectory.timestamps.size()) + " times for " +
+                    std::to_string(trajectory.size()) + " poses of " + trajectory.name,
+                "one time for each pose" +
+                    (shared ? ", or " + dedicated.string() + " in the same folder" : ""));
 }
 
 }  // namespace

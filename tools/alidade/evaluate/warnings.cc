@@ -142,7 +142,7 @@ class WarningCollector {
     Warn(std::to_string(matched) + " of " + std::to_string(matches_.possible) +
              " possible poses match within " + RoundedText(Seconds(evaluation_.options.max_diff)) +
              " s",
-         "the same clock and rate; --t-offset, --t-max-diff");
+         "the same clock and rate, or the options --t-offset and --t-max-diff");
   }
 
   void CheckTimestamps() {
@@ -156,8 +156,8 @@ class WarningCollector {
     std::nth_element(differences.begin(), middle, differences.end());
     const double offset_s = std::abs(Seconds(*middle));
     if (!(offset_s > kMaxTimeOffset * Seconds(evaluation_.options.max_diff))) return;
-    Warn("the median timestamp is " + RoundedText(offset_s) + " s " +
-             (*middle > 0 ? "before" : "after") + " that of the reference",
+    Warn("in the median, the timestamps are " + RoundedText(offset_s) + " s " +
+             (*middle > 0 ? "before" : "after") + " those of the reference",
          "--t-offset " + RoundedText(Seconds(evaluation_.options.offset + *middle)));
   }
 
@@ -180,8 +180,8 @@ class WarningCollector {
     const double se3_error = Rmse(evaluation_.reference, se3 * evaluation_.estimate);
     if (!(sim3_error < 0.5 * se3_error)) return;
     Warn("scale " + RoundedText(sim3.scale, 4) + " (error " + RoundedText(sim3_error, 4) +
-             " m by sim3, " + RoundedText(se3_error, 4) +
-             " m by se3): probably a run without metric scale",
+             " m with sim3, " + RoundedText(se3_error, 4) +
+             " m with se3): probably a run without metric scale",
          "-as");
   }
 
@@ -200,7 +200,8 @@ class WarningCollector {
     const Alignment alignment = evaluation_.options.alignment;
     if (alignment != Alignment::kSe3 && alignment != Alignment::kSim3) return;
     Warn(std::string("positions of the estimate or the reference are collinear: the rotation of ") +
-             ToString(alignment) + " about the line is arbitrary, and so are orientation errors",
+             ToString(alignment) +
+             " about the line is arbitrary, so orientation errors are arbitrary as well",
          "no alignment, --align-origin or --align-mode yaw for orientation errors");
   }
 

@@ -12,7 +12,7 @@ namespace alidade::internal {
 
 /// Writer of `NAME/errors.csv`. The file exists if the source provides the truth of a block:
 ///
-///   e      = x (-) x_true    of each tangent element, in the tangent space at the estimate, as for P
+///   e      = x (-) x_true    of each tangent element, in the tangent space at the estimate
 ///   sigma  = sqrt(P_ii)      of the estimate; the uncertainty of the truth is not included
 ///
 /// e is computed as -(x_true (-) x), which equals x (-) x_true for vectors, angles and rotations.

@@ -55,7 +55,7 @@ void TimingFile::Describe(RecordedRun& run) const {
 }
 
 FigureScript TimingFigure(const RecordedRun& run) {
-  FigureScript script("timing", "time that each frame took", run.first, run.last);
+  FigureScript script("timing", "wall-clock time of each frame", run.first, run.last);
   const double span_s = Seconds(run.last) - Seconds(run.first);
   if (run.timing_rows < 2 || !(span_s > 0.0)) return script;
   const FigureFile file{"timing.csv", run.timing_rows};
@@ -63,7 +63,7 @@ FigureScript TimingFigure(const RecordedRun& run) {
   for (const RecordedTimes& times : run.times) {
     if (!times.is_known || style == kMaxCurves) continue;
     if (style++ == 0) {
-      script.Panel("wall clock of a frame", "[ms]");
+      script.Panel("wall-clock time of a frame", "[ms]");
       script.Set("period = " + NumberText(span_s / static_cast<double>(run.timing_rows - 1)));
       script.Set("set logscale y\nset format y '%g'\nunset mytics");
     }

@@ -11,7 +11,7 @@ namespace alidade::internal {
 /// Refuses a source that can be read only once: standard input or a pipe. In the message, `reader`
 /// explains why the source is read again. Error: kBadConfig.
 void CheckReadableAgain(const Config& config,
-                        const char* reader = "a sweep reads it for every run");
+                        const char* reader = "a sweep reads the source for every run");
 
 /// Returns true if the data of the source depend on the seed. Reads the data of `seed` and of the
 /// next seed up to the first difference. Also returns true if the data cannot be read without an

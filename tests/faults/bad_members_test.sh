@@ -34,7 +34,7 @@ for number in 1 2 3 4; do refused "$number" Seen "$jacobian"; done
 for number in 5 6; do
   refused "$number" Seen 'Valid exists but cannot be called as bool Valid([const double* known,] const double* z) const'
 done
-refused 7 Seen 'Initialise exists but kInitialises, the index of the role that it computes, does not'
+refused 7 Seen 'Initialise exists, but the model does not define kInitialises, the index of the role that Initialise computes'
 refused 8 Seen 'Initialise cannot be called as bool Initialise(const T* other_role..., [const double* known,] const T* z, [const T* prior,] T* y) const'
 for number in 10 11; do
   refused "$number" Moved 'StepJacobian exists but cannot be called as StepJacobian(const double* block..., const double* w, double dt_s, MatrixRef F, MatrixRef G) const'
@@ -45,12 +45,12 @@ refused 14 Seen 'a sensor needs template <class T> void SqrtNoise(const T* role.
 refused 15 Moved 'a motion model needs template <class T> void Step(const T* block..., [const T* u,] const T* w, double dt_s, T* next...) const'
 refused 16 Moved 'a motion model needs void SqrtQ([const double* block...,] double dt_s, MatrixRef Lq) const'
 for number in 17 18 19; do
-  refused "$number" Moved 'kStepOrder is a static constexpr int from 0 to 8'
+  refused "$number" Moved 'kStepOrder has to be a static constexpr int from 0 to 8'
 done
 refused 20 Seen 'a sensor needs static constexpr std::array kRoles'
 refused 20 Seen 'a sensor needs static constexpr alidade::Quantity kMeasurement'
-refused 21 Seen 'Predict has to be a template <class T> on the scalar'
+refused 21 Seen 'Predict has to be a template <class T> on the scalar type'
 refused 22 Moved 'a motion model needs static constexpr std::array kBlocks'
-refused 23 Moved 'Step has to be a template <class T> on the scalar'
-refused 24 Moved 'noise_kind has to be NoiseKind noise_kind() const'
+refused 23 Moved 'Step has to be a template <class T> on the scalar type'
+refused 24 Moved 'noise_kind has to be declared as NoiseKind noise_kind() const'
 echo "all are refused in words"

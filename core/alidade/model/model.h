@@ -13,21 +13,22 @@
 #include "alidade/model/geometry.h"
 #include "alidade/model/params.h"
 
-/// Bases of models. A model is a struct that derives from Sensor or Motion. Its functions are
-/// templates of the scalar and have no side effects. It needs this header and C++17 only, and works
-/// without the plugin machinery.
+/// Base classes of models. A model is a struct that derives from Sensor or Motion. The functions of
+/// a model are templates of the scalar type and have no side effects. A model needs only this
+/// header and C++17, and can be used without a plugin.
 namespace alidade {
 
-/// A named quantity: a role, a measurement or a control input.
+/// Name and unit of a quantity: a role, a measurement or a control input.
 struct Quantity {
   const char* name;
   const char* unit = "";
   const char* doc = "";
-  const char* elements = "";  ///< names such as "x,y,z"; "" for a single element
+  const char* elements = "";  ///< names of the elements, such as "x,y,z"; "" for one element
   unsigned flags = 0;         ///< ALIDADE_ROLE_*
 };
 
-/// Row-major view of a Jacobian or covariance factor. Empty if the caller does not request it.
+/// Row-major view of a Jacobian or covariance factor. Empty if the caller does not request the
+/// matrix.
 struct MatrixRef {
   double* data = nullptr;
   int stride = 0;
@@ -40,23 +41,24 @@ struct MatrixRef {
 };
 
 /// Prior and dynamics of a role with the flag ALIDADE_ROLE_OWNED. A config may override them.
-/// `mean` has a number for each ambient element, the others for each element of the tangent.
+/// `mean` has one number for each ambient element. `sigma` and `density` have one number for each
+/// tangent element.
 struct Owned {
   std::uint32_t dynamics = ALIDADE_STAYS;
   std::vector<double> mean, sigma;
-  std::vector<double> density;   ///< driving white noise, unit / sqrt(s)
-  double time_constant_s = 0.0;  ///< of a Gauss-Markov process
+  std::vector<double> density;   ///< root of the density of the driving white noise, unit / sqrt(s)
+  double time_constant_s = 0.0;  ///< time constant of a Gauss-Markov process
 
-  /// Returns a prior without dynamics.
+  /// Returns the prior of a constant.
   static Owned Constant(std::vector<double> mean, std::vector<double> sigma) {
     return {ALIDADE_STAYS, std::move(mean), std::move(sigma), {}, 0.0};
   }
-  /// Returns a random walk; `walk` is the standard deviation of its change in one second.
+  /// Returns a random walk. `walk` is the standard deviation of the change in one second.
   static Owned RandomWalk(std::vector<double> mean, std::vector<double> sigma,
                           std::vector<double> walk) {
     return {ALIDADE_RANDOM_WALK, std::move(mean), std::move(sigma), std::move(walk), 0.0};
   }
-  /// Returns a stationary Gauss-Markov process: `sigma` is its standard deviation at all times.
+  /// Returns a stationary Gauss-Markov process. `sigma` is the standard deviation at all times.
   static Owned GaussMarkov(std::vector<double> mean, std::vector<double> sigma,
                            double time_constant_s) {
     std::vector<double> density = sigma;
@@ -66,45 +68,48 @@ struct Owned {
   }
 };
 
-/// Process noise over an interval that is predicted in several steps. An interval lies between two
-/// updates. Both kinds are white from one interval to the next.
+/// Kind of process noise. It determines the noise over an interval between two updates that is
+/// predicted in several steps. With both kinds, different intervals have independent noise.
 enum class NoiseKind {
-  kContinuous,  ///< w is drawn for each step: the interval has Q = F_2 Q_1 F_2' + Q_2
-  kDiscrete,    ///< w is constant over the interval, which has G Lq = (F_2 G_1 + G_2) Lq
+  /// Each step has independent noise w. For an interval of two steps, Q = F_2 Q_1 F_2' + Q_2.
+  kContinuous,
+  /// w is constant over the interval. For an interval of two steps, G Lq = (F_2 G_1 + G_2) Lq.
+  kDiscrete,
 };
 
-/// Base of a sensor z = h(roles) + n, n ~ N(0, L L'). The model has
+/// Base of a sensor z = h(roles) + n, n ~ N(0, L L'). The model must have
 ///
-///   static constexpr std::array kRoles{Quantity{...}, ...};      one for each role geometry
+///   static constexpr std::array kRoles{Quantity{...}, ...};      one for each role
 ///   static constexpr Quantity kMeasurement{...};
 ///   static constexpr std::array kParts{Quantity{...}, ...};      one for each part of a Product
 ///   explicit Model(Params&);
 ///   template <class T> bool Predict(const T* role..., T* z) const;      false: out of domain
 ///   template <class T> void SqrtNoise(const T* role..., [const T* z,] T* L) const;
-///                                                                       L row-major, zeroed
+///                                                                       L: row-major, initially 0
 ///
-/// and may have
+/// and may also have
 ///
-///   using Known = Vec<3>; static constexpr Quantity kKnown{...};    numbers that come with each
-///                                       measurement and are not estimated, such as a satellite's
-///                                       position. Every function accepts `const double* known`
-///                                       after the roles: Predict(role..., known, z),
-///                                       Valid(known, z)
+///   using Known = Vec<3>; static constexpr Quantity kKnown{...};    known numbers of each
+///                                       measurement, which are not estimated, such as the
+///                                       position of a satellite. Every function has the argument
+///                                       `const double* known` after the roles:
+///                                       Predict(role..., known, z), Valid(known, z)
 ///   bool Valid(const double* z) const;
-///   static constexpr int kInitialises;                         index of the role y below
+///   static constexpr int kInitialises;                         index of the initialised role, y
 ///   template <class T> bool Initialise(const T* other..., const T* z[, prior], T* y) const;
-///   static constexpr int kPrior;         count of the prior's numbers; default 0
-///   void Jacobian(const double* role..., MatrixRef J_z_role...) const;  analytic, zeroed
+///   static constexpr int kPrior;         number of elements of the prior; default: 0
+///   void Jacobian(const double* role..., MatrixRef J_z_role...) const;  analytic; initially 0
 ///
-/// A role with the flag ALIDADE_ROLE_OWNED is a state of the sensor, such as a bias or a lever arm,
-/// unless the config binds it to a block. It is constant at the neutral element of its geometry,
-/// unless the model defines its prior and dynamics by
+/// A role with the flag ALIDADE_ROLE_OWNED is a model parameter state of the sensor, such as a bias
+/// or a lever arm, unless the config binds the role to a block. Such a state is constant at the
+/// neutral element of its geometry, unless the model defines prior and dynamics by
 ///
 ///   Owned OwnedRole(int role) const;
 ///
-/// Roles with the flag ALIDADE_ROLE_LANDMARK are adjacent. They are bound to the landmark that a
-/// measurement names. If kInitialises is the first of them, y contains all of them, one after the
-/// other. An optional member with another signature is a compile error (model_members.h).
+/// Roles with the flag ALIDADE_ROLE_LANDMARK must be adjacent. They are bound to the landmark that
+/// a measurement names. If kInitialises is the first of these roles, y contains the values of all
+/// of them, one after the other. An optional member with a wrong signature is a compile error
+/// (model_members.h).
 template <class MeasurementGeometry, class... RoleGeometries>
 struct Sensor {
   static_assert(((RoleGeometries::kGeometry != ALIDADE_PRODUCT) && ... && true),
@@ -117,32 +122,35 @@ struct Sensor {
   static constexpr int kInitialises = -1;
 };
 
-/// Base of a motion model x' = f(x, u, w, dt), w ~ N(0, Lq Lq') of size NoiseSize. The model has
+/// Base of a motion model x' = f(x, u, w, dt), w ~ N(0, Lq Lq'). w has NoiseSize elements. The
+/// model must have
 ///
-///   static constexpr std::array kBlocks{Quantity{...}, ...};     one for each block geometry
+///   static constexpr std::array kBlocks{Quantity{...}, ...};     one for each block
 ///   explicit Model(Params&);
 ///   template <class T> void Step(const T* block..., [const T* u,] const T* w, double dt_s,
 ///                                T* next...) const;
-///   void SqrtQ([const double* block...,] double dt_s, MatrixRef Lq) const;       zeroed
+///   void SqrtQ([const double* block...,] double dt_s, MatrixRef Lq) const;       Lq: initially 0
 ///
-/// Step may return bool; false means out of domain. The model may have
+/// Step may return bool; false means out of domain. The model may also have
 ///
 ///   using Input = Vec<2>; static constexpr Quantity kInput{...};        a control input u
 ///   void StepJacobian(const double* block..., const double* w, double dt_s, MatrixRef F,
-///                     MatrixRef G) const;      analytic, zeroed; only without control input
-///   bool Stationary() const;                   x' = x without noise: estimators skip the step
-///   NoiseKind noise_kind() const;              default kContinuous; `alidade check` compares
-///   static constexpr int kStepOrder = N;       1 to 8: additive in dt up to an error of order
-///                                              dt^N (Euler's method: 2); default 0: additive
+///                     MatrixRef G) const;      analytic; F and G are initially 0; only for models
+///                                              without control input
+///   bool Stationary() const;                   true: x' = x and no noise; estimators skip the
+///                                              step
+///   NoiseKind noise_kind() const;              default: kContinuous; `alidade check` tests it
+///   static constexpr int kStepOrder = N;       1 to 8: steps are additive in dt up to an error of
+///                                              order dt^N (Euler's method: 2). Default 0: additive
 ///
-/// Lq of discrete noise is evaluated at the start of its interval and does not depend on dt_s.
+/// Lq of discrete noise is evaluated at the start of an interval and must not depend on dt_s.
 ///
-/// A block with the flag ALIDADE_ROLE_OWNED, such as a bias or an extrinsic, is constant at the
-/// neutral element of its geometry, unless the config defines an initial value.
+/// A block with the flag ALIDADE_ROLE_OWNED, such as a bias or an extrinsic parameter, is constant
+/// at the neutral element of its geometry, unless the config defines an initial value.
 ///
-/// Blocks of size kDynamic need StepJacobian, `int Size(int block) const` and
-/// `int NoiseSize() const`. Their Step, StepJacobian and SqrtQ write to the caller's buffers and
-/// must not throw. A Step that returns false must leave the buffers untouched.
+/// A model with blocks of size kDynamic needs StepJacobian, `int Size(int block) const` and `int
+/// NoiseSize() const`. Its Step, StepJacobian and SqrtQ write directly to the buffers of the caller
+/// and must not throw. If Step returns false, it must not have changed the buffers.
 template <int NoiseSize, class... BlockGeometries>
 struct Motion {
   using Spaces = std::tuple<BlockGeometries...>;
@@ -172,7 +180,7 @@ using Blocks = SpacesOf<typename Model::Spaces>;
 template <int I, class Model>
 using SpaceAt = std::tuple_element_t<static_cast<std::size_t>(I), typename Model::Spaces>;
 
-/// Returns true if Initialise computes role i.
+/// Returns whether Initialise computes the role i.
 template <class Model>
 constexpr bool IsInitialised(int i) {
   constexpr int first = Model::kInitialises;
@@ -185,13 +193,13 @@ constexpr bool IsInitialised(int i) {
   return true;
 }
 
-/// Calls f(integral_constant<int, I>) for every I.
+/// Calls f(integral_constant<int, I>{}) for every I.
 template <class F, std::size_t... I>
 void ForEach(const F& f, std::index_sequence<I...>) {
   (f(std::integral_constant<int, static_cast<int>(I)>{}), ...);
 }
 
-/// `const T*` for every index.
+/// `const T*`, and MatrixRef, for every index of a pack.
 template <class T, std::size_t>
 using Pointer = const T*;
 template <std::size_t>
@@ -200,7 +208,7 @@ using Matrix = MatrixRef;
 template <class Model>
 inline constexpr bool kHasKnown = Model::Known::kAmbient > 0;
 
-/// Calls f(role pointers..., [known,] arguments...) of a sensor.
+/// Calls f(role pointers..., [known,] arguments...) with the roles of a sensor.
 template <class Model, class F, class T, std::size_t... I, class... Arguments>
 decltype(auto) WithRoles(const F& f, const T* const* x, const double* known,
                          std::index_sequence<I...>, Arguments... arguments) {
@@ -213,7 +221,7 @@ decltype(auto) WithRoles(const F& f, const T* const* x, const double* known,
   }
 }
 
-/// `value` is true if Call accepts (model, const T* for each of Indices..., [known,]
+/// `value` is true if Call can be called with (model, a `const T*` for each of Indices, [known,]
 /// arguments...).
 template <class T, class Call, class Model, class Indices, class... Arguments>
 struct AcceptsRolesOf;
@@ -251,7 +259,7 @@ template <class Model>
 struct HasSimpleSqrtQ<Model, std::void_t<decltype(std::declval<const Model&>().SqrtQ(
                                  1.0, std::declval<MatrixRef>()))>> : std::true_type {};
 
-/// Calls f(block pointers..., [input,] arguments...) of a motion model.
+/// Calls f(block pointers..., [input,] arguments...) with the blocks of a motion model.
 template <class Model, class T, class F, std::size_t... I, class... Arguments>
 auto WithBlocks(const F& f, const T* const* x, const T* u, std::index_sequence<I...>,
                 Arguments... arguments) {
@@ -275,7 +283,7 @@ bool CallStep(const Model& model, const T* const* x, const T* u, const T* w, dou
   }
 }
 
-/// Computes L with R = L L' of a sensor, row-major. The caller zeroes L.
+/// Computes L of R = L L' of a sensor, row-major. All elements of L must be 0 before the call.
 template <class Model, std::size_t... I>
 void CallSqrtNoise(const Model& model, const double* const* x, const double* known, const double* z,
                    double* l, std::index_sequence<I...> indices) {
@@ -288,7 +296,7 @@ void CallSqrtNoise(const Model& model, const double* const* x, const double* kno
   }
 }
 
-/// Computes Lq of a motion model. The caller zeroes Lq.
+/// Computes Lq of a motion model. All elements of Lq must be 0 before the call.
 template <class Model, std::size_t... I>
 void CallSqrtQ(const Model& model, const double* const* x, double dt_s, MatrixRef l,
                std::index_sequence<I...>) {

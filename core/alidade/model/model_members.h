@@ -8,16 +8,17 @@
 #include "alidade/model/jet.h"
 #include "alidade/model/model.h"
 
-/// Readable compile errors for required members of a model that are missing. The checks also reject
-/// optional members that exist but have another signature, because these would be ignored silently.
-/// Optional members of a final struct are not checked.
+/// Checks of the members of a model, with readable compile errors. The checks reject a model
+/// without a required member. They also reject an optional member with a wrong signature, which
+/// would otherwise be ignored silently. Optional members of a final struct are not checked.
 namespace alidade {
 namespace detail {
 
 struct Nothing {};
 
-/// DeclaresNAME<Model>::value is true if the model has a member NAME of any kind. A struct derives
-/// from the model and from another struct with a member NAME, so that NAME is then ambiguous.
+/// DeclaresNAME<Model>::value is true if the model has any member NAME. The check derives a struct
+/// from the model and from another struct with a member NAME. If the model has a member NAME too,
+/// NAME is ambiguous.
 #define ALIDADE_DECLARES(NAME)                                                         \
   struct With##NAME {                                                                  \
     int NAME;                                                                          \
@@ -46,7 +47,7 @@ struct PredictCall {
 template <class Model, class Indices, class T = double>
 struct HasPredict : AcceptsRolesOf<T, PredictCall, Model, Indices, T*> {};
 
-/// A scalar of automatic differentiation.
+/// Scalar type of automatic differentiation.
 using AnyJet = Jet<double, 1>;
 
 template <class Model, class = void>
@@ -106,7 +107,7 @@ struct ValidCall {
 template <class Model>
 struct HasValid : AcceptsRoles<ValidCall, Model, std::index_sequence<>, const double*> {};
 
-/// Calls Valid of a model that has it.
+/// Calls Valid of a model that has this member.
 template <class Model>
 bool CallValid(const Model& model, const double* known, const double* z) {
   const auto valid = [&](auto... arguments) -> bool { return model.Valid(arguments...); };
@@ -150,7 +151,7 @@ struct CanInitialise {
           : AcceptsRoles<InitialiseCall, Model, OtherRoles, const double*, double*>::value;
 };
 
-/// Returns true if each quantity has a name.
+/// Returns whether each quantity has a name.
 template <class Quantities>
 constexpr bool AreNamed(const Quantities& quantities) {
   for (const Quantity& quantity : quantities) {
@@ -159,8 +160,8 @@ constexpr bool AreNamed(const Quantities& quantities) {
   return true;
 }
 
-/// Rejects at compile time a sensor without the names that a problem and a plugin need. A filter
-/// that is composed at compile time does not need them. Always returns true.
+/// Rejects at compile time a sensor without the names that a problem or a plugin needs. StaticEkf
+/// does not need these names. Always returns true.
 template <class Model>
 constexpr bool CheckSensorNames() {
   static_assert(HasRoles<Model>::value,
@@ -181,7 +182,7 @@ constexpr bool CheckMotionNames() {
   return true;
 }
 
-/// Rejects at compile time a sensor whose functions are missing or have another signature. Always
+/// Rejects at compile time a sensor if a function is missing or has a wrong signature. Always
 /// returns true.
 template <class Model>
 constexpr bool CheckSensorMembers() {
@@ -192,8 +193,8 @@ constexpr bool CheckSensorMembers() {
                 "known,] T* z) const, with one pointer for each role: see docs/add_a_sensor.md");
   static_assert(HasJacobian<Model, Indices>::value || !HasPredict<Model, Indices>::value ||
                     HasPredict<Model, Indices, AnyJet>::value,
-                "Predict has to be a template <class T> on the scalar, for automatic "
-                "differentiation, unless the sensor has Jacobian: see docs/add_a_sensor.md");
+                "Predict has to be a template <class T> on the scalar type, for automatic "
+                "differentiation, unless the sensor defines Jacobian: see docs/add_a_sensor.md");
   static_assert(HasSqrtNoise<Model, Indices>::value,
                 "a sensor needs template <class T> void SqrtNoise(const T* role..., [const double* "
                 "known,] [const T* z,] T* L) const: see docs/add_a_sensor.md");
@@ -206,11 +207,12 @@ constexpr bool CheckSensorMembers() {
   static_assert(!DeclaresOwnedRole<Model>::value || HasOwnedRole<Model>::value,
                 "OwnedRole exists but cannot be called as Owned OwnedRole(int role) const: see "
                 "docs/add_a_sensor.md");
-  static_assert(!DeclaresInitialise<Model>::value || Model::kInitialises >= 0,
-                "Initialise exists but kInitialises, the index of the role that it computes, does "
-                "not: see docs/add_a_sensor.md");
+  static_assert(
+      !DeclaresInitialise<Model>::value || Model::kInitialises >= 0,
+      "Initialise exists, but the model does not define kInitialises, the index of the role "
+      "that Initialise computes: see docs/add_a_sensor.md");
   static_assert(Model::kInitialises < 0 || CanInitialise<Model, OtherRoles>::value,
-                "kInitialises exists but Initialise cannot be called as bool Initialise(const T* "
+                "kInitialises exists, but Initialise cannot be called as bool Initialise(const T* "
                 "other_role..., [const double* known,] const T* z, [const T* prior,] T* y) const: "
                 "see docs/add_a_sensor.md");
   return true;
@@ -225,8 +227,8 @@ constexpr bool StepOrderFits() {
   }
 }
 
-/// Rejects at compile time a motion model whose functions are missing or have another signature.
-/// Always returns true.
+/// Rejects at compile time a motion model if a function is missing or has a wrong signature. Always
+/// returns true.
 template <class Model>
 constexpr bool CheckMotionMembers() {
   using Indices = typename Blocks<Model>::Indices;
@@ -234,12 +236,13 @@ constexpr bool CheckMotionMembers() {
                 "a motion model needs template <class T> void Step(const T* block..., [const T* "
                 "u,] const T* w, double dt_s, T* next...) const, with one pointer for each block: "
                 "see alidade/model/model.h");
-  static_assert(HasStepJacobian<Model, Indices>::value || !HasStep<Model, Indices>::value ||
-                    HasStep<Model, Indices, AnyJet>::value,
-                "Step has to be a template <class T> on the scalar, for automatic differentiation, "
-                "unless the model has StepJacobian: see docs/add_a_motion_model.md");
+  static_assert(
+      HasStepJacobian<Model, Indices>::value || !HasStep<Model, Indices>::value ||
+          HasStep<Model, Indices, AnyJet>::value,
+      "Step has to be a template <class T> on the scalar type, for automatic differentiation, "
+      "unless the model defines StepJacobian: see docs/add_a_motion_model.md");
   static_assert(std::is_same_v<decltype(std::declval<const Model&>().noise_kind()), NoiseKind>,
-                "noise_kind has to be NoiseKind noise_kind() const: see "
+                "noise_kind has to be declared as NoiseKind noise_kind() const: see "
                 "docs/add_a_motion_model.md");
   static_assert(HasSqrtQ<Model, Indices>::value,
                 "a motion model needs void SqrtQ([const double* block...,] double dt_s, MatrixRef "
@@ -248,15 +251,16 @@ constexpr bool CheckMotionMembers() {
                 "StepJacobian exists but cannot be called as StepJacobian(const double* block..., "
                 "const double* w, double dt_s, MatrixRef F, MatrixRef G) const: see "
                 "alidade/model/model.h");
-  static_assert(!HasStepJacobian<Model, Indices>::value || Model::Input::kAmbient == 0,
-                "StepJacobian takes no control input: a model that has one leaves its Jacobians to "
-                "automatic differentiation");
+  static_assert(
+      !HasStepJacobian<Model, Indices>::value || Model::Input::kAmbient == 0,
+      "StepJacobian is not supported for a model with a control input, whose Jacobians are "
+      "computed by automatic differentiation");
   static_assert(!DeclaresStationary<Model>::value || HasStationary<Model>::value,
                 "Stationary exists but cannot be called as bool Stationary() const: see "
                 "alidade/model/model.h");
   static_assert(StepOrderFits<Model>(),
-                "kStepOrder is a static constexpr int from 0 to 8, the order in dt of the error of "
-                "a step, 2 by Euler's method: see docs/add_a_motion_model.md");
+                "kStepOrder has to be a static constexpr int from 0 to 8, the order in dt of the "
+                "error of a step (2 for Euler's method): see docs/add_a_motion_model.md");
   static_assert(
       Blocks<Model>::kStatic || HasSize<Model>::value,
       "a block of size kDynamic needs int Size(int block) const: see alidade/model/model.h");

@@ -15,7 +15,7 @@
 
 namespace alidade {
 
-/// Bounds of a parameter; an open bound is itself excluded.
+/// Bounds of a parameter. An open bound excludes the bound itself.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -25,17 +25,17 @@ struct Range {
 inline constexpr Range kPositive{0.0, std::numeric_limits<double>::infinity(), true, false};
 inline constexpr Range kNonNegative{0.0, std::numeric_limits<double>::infinity(), false, false};
 
-/// Parameters of a model, read from its entry in the config. Each read also declares the parameter.
-/// The keys, units, ranges, defaults and docs of all reads form the model's schema
-/// (`alidade plugins info`). Other keys are refused. A bad value does not stop the constructor. The
-/// read returns a valid stand-in, and the host refuses the model afterwards with all its errors at
-/// once.
+/// Parameters of a model, which are read from the entry of the model in the config. Each read also
+/// declares the parameter. The keys, units, ranges, defaults and docs of all reads form the schema
+/// of the model (`alidade plugins info`). Other keys are rejected. An invalid value does not stop
+/// the constructor of the model. Instead, the read returns a valid substitute. Afterwards the host
+/// rejects the model and reports all errors at once.
 class Params {
  public:
   explicit Params(const AlidadeHost* host) : host_(host) {}
 
-  /// Returns the value of `key`, or a stand-in within `range` if it is bad. With a `fallback` the
-  /// key is optional.
+  /// Returns the value of `key`, or a substitute within `range` if the value is invalid. The key is
+  /// optional if `fallback` is given.
   double Number(const char* key, const char* unit, const char* doc, Range range = {},
                 std::optional<double> fallback = std::nullopt) {
     double value = fallback.value_or(StandIn(range));
@@ -43,7 +43,7 @@ class Params {
          1);
     return value;
   }
-  /// Returns the value of `key`, or nullopt for the word `none`, which is the default.
+  /// Returns the value of `key`, or nullopt if it is the word `none`. The default is `none`.
   std::optional<double> NumberOrNone(const char* key, const char* unit, const char* doc,
                                      Range range) {
     const double infinity = std::numeric_limits<double>::infinity();
@@ -76,7 +76,7 @@ class Params {
          &value, 1);
     return value != 0.0;
   }
-  /// Returns the index of the chosen name in `choices`; `fallback` is an index.
+  /// Returns the index in `choices` of the chosen name. `fallback` is also an index.
   template <class Names = std::initializer_list<const char*>>
   int Choice(const char* key, const Names& choices, const char* doc,
              std::optional<int> fallback = std::nullopt) {
@@ -89,7 +89,7 @@ class Params {
     host_->read(host_->context, &param, &value, 1);
     return static_cast<int>(value);
   }
-  /// Returns the text of `key`, unchanged; it has at most 4096 bytes.
+  /// Returns the text of `key` unchanged. The text has at most 4096 bytes.
   std::string Text(const char* key, const char* doc,
                    const std::optional<std::string>& fallback = std::nullopt) {
     AlidadeParam param = Describe(ALIDADE_PARAM_TEXT, key, "", doc, {}, 1, nullptr);
@@ -102,7 +102,7 @@ class Params {
                                                static_cast<std::int32_t>(text.size()));
     return size < 0 ? fallback.value_or("") : std::string(text.data());
   }
-  /// Returns the `N` numbers of `key`, all with the same unit and range.
+  /// Returns the `N` numbers of `key`, which all have the same unit and range.
   template <int N>
   std::array<double, N> Vector(const char* key, const char* unit, const char* doc, Range range = {},
                                std::optional<std::array<double, N>> fallback = std::nullopt) {
@@ -113,11 +113,12 @@ class Params {
          values.data(), N);
     return values;
   }
-  /// Returns `N` numbers of the same unit and range. The config may state one number for all.
+  /// Returns `N` numbers with the same unit and range. The config contains `N` numbers, or one
+  /// number that applies to all axes.
   template <int N>
   std::array<double, N> PerAxis(const char* key, const char* unit, const char* doc,
                                 Range range = {}) {
-    double values[N + 1];  // an additional element detects a list that is too long
+    double values[N + 1];  // one more element, to detect a list that is too long
     const std::int32_t count =
         Read(ALIDADE_PARAM_NUMBER, key, unit, doc, range, -1, nullptr, values, N + 1);
     std::array<double, N> result;
@@ -126,7 +127,8 @@ class Params {
     if (count > 1 && count != N) Fail(key, "needs one number, or one for each axis");
     return result;
   }
-  /// Reports that parameters which are valid by themselves are not consistent.
+  /// Reports an error of parameters, for example parameters that contradict each other. `text`
+  /// follows the key in the message.
   void Fail(const char* key, const char* text) { host_->fail(host_->context, key, text); }
 
  private:

@@ -8,13 +8,13 @@
 #include "alidade/model/build_tag.h"
 #include "alidade/model/plugin_thunks.h"
 
-/// Exports models through the plugin ABI, plugin_abi.h. In the .cc of a plugin:
+/// Exports models through the plugin ABI (plugin_abi.h). The .cc file of a plugin contains
 ///
 ///   ALIDADE_PLUGIN(ALIDADE_SENSOR(Model, "name", "doc", "citation"), ...)
 namespace alidade {
 namespace detail {
 
-/// Transfers `holder` to `instance`, which then owns it.
+/// Stores `holder` in `instance`, which then owns it.
 template <class Model>
 void Publish(std::unique_ptr<Holder<Model>> holder, std::uint32_t kind, AlidadeInstance* instance) {
   instance->kind = kind;
@@ -27,7 +27,7 @@ void Publish(std::unique_ptr<Holder<Model>> holder, std::uint32_t kind, AlidadeI
 template <class Model>
 void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* instance) {
   static_assert(CheckSensorNames<Model>());
-  constexpr auto roles = Model::kRoles;  // a copy, so that plugins do not share the symbol
+  constexpr auto roles = Model::kRoles;  // copied, so that plugins do not share the symbol
   holder->DescribeRoles(roles);
   holder->DescribeMeasurement();
   holder->DescribeKnown();
@@ -73,7 +73,7 @@ void PublishMotion(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
   Publish(std::move(holder), ALIDADE_KIND_MOTION, instance);
 }
 
-/// Runs f(params) for an entry's `create`. Reports an exception to the host.
+/// Implements `create` of an entry: runs f(params) and reports an exception to the host.
 template <class F>
 std::int32_t GuardedCreate(const AlidadeHost* host, const F& f) noexcept {
   Params params(host);
@@ -115,7 +115,7 @@ constexpr AlidadeEntry Entry(std::uint32_t kind, const char* name, const char* d
 
 }  // namespace detail
 
-/// Creates a model from its parameters and transfers it to `instance`.
+/// Creates a model from its parameters and stores it in `instance`.
 template <class Model>
 void EmplaceSensor(Params& params, AlidadeInstance* instance) {
   detail::PublishSensor(std::make_unique<detail::Holder<Model>>(params), instance);
@@ -127,9 +127,9 @@ void EmplaceMotion(Params& params, AlidadeInstance* instance) {
 
 }  // namespace alidade
 
-/// Defines one model of a plugin. The _BY macros accept a function
-/// `void (alidade::Params&, AlidadeInstance*)`. It reads a parameter to choose the struct to
-/// emplace.
+/// Each of these macros defines one model of a plugin. The argument `make` of the _BY macros is a
+/// function `void (alidade::Params&, AlidadeInstance*)`. Use them if a parameter selects the struct
+/// of the model. The function reads the parameter and emplaces the struct.
 #define ALIDADE_SENSOR(Model, name, doc, citation) \
   ALIDADE_SENSOR_BY(alidade::EmplaceSensor<Model>, name, doc, citation)
 #define ALIDADE_MOTION(Model, name, doc, citation) \
@@ -139,8 +139,8 @@ void EmplaceMotion(Params& params, AlidadeInstance* instance) {
 #define ALIDADE_MOTION_BY(make, name, doc, citation) \
   (alidade::detail::Entry<make>(ALIDADE_KIND_MOTION, name, doc, citation))
 
-/// Exports the models, which are constant expressions, as the plugin's table. Use it once in each
-/// plugin.
+/// Exports the given models, which must be constant expressions, as the table of the plugin. Use
+/// this macro once in each plugin.
 #define ALIDADE_PLUGIN(...)                                                                        \
   ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_C_ABI, "")                                                      \
   static constexpr AlidadeEntry alidade_entries[] = {__VA_ARGS__};                                 \

@@ -5,38 +5,40 @@
  * use model.h, which implements this interface for them. The header compiles as C99 and as C++17.
  * The text below is normative; docs/plugin_abi.md repeats it with the reasons.
  *
- * A plugin exports one function, `alidade_plugin`, which returns its table. It also contains one
- * build tag in the ELF section `.alidade`, which the host reads before it loads the file. A plugin
- * may list its names in the section `.alidade_names`. The host then need not load it to find them.
+ * A plugin exports one function, `alidade_plugin`, which returns the table of the plugin. A plugin
+ * also contains one build tag in the ELF section `.alidade`, which the host reads before it loads
+ * the file. A plugin may list the names of its entries in the section `.alidade_names`. The host
+ * can then find the names without loading the file.
  *
  * Structs. Every struct begins with its own size. A reader of a struct from the other side reads
- * only that many bytes and treats members beyond them as zero. Tables are traversed with the stride
- * that they state. Within a major version, structs that plugins create may grow at their end and
- * may use reserved members. Structs that hosts create (AlidadeHost, AlidadeInstance,
- * AlidadeObservation, AlidadePayload) may only use reserved members. Reserved members are zero; a
- * reader refuses a struct in which one is not. The bits of ALIDADE_MUST_UNDERSTAND are the upper
- * half of every word of flags. A reader refuses a struct in which an unknown one is set, and
- * ignores an unknown bit of the lower half. An entry of unknown kind is ignored, but its plugin is
- * not.
+ * only that many bytes and treats members beyond them as zero. Arrays of structs are traversed with
+ * the stride that is stated next to them. Within a major version, structs that plugins create may
+ * grow at their end and may use reserved members. Structs that hosts create (AlidadeHost,
+ * AlidadeInstance, AlidadeObservation, AlidadePayload) may only use reserved members. Reserved
+ * members are zero; a reader rejects a struct with a reserved member that is not zero. The upper
+ * half of every word of flags are the bits of ALIDADE_MUST_UNDERSTAND. A reader rejects a struct if
+ * an unknown bit of the upper half is set, and ignores unknown bits of the lower half. A host
+ * ignores an entry of unknown kind, but not the other entries of the plugin.
  *
  * Texts are UTF-8 without control characters, of at most ALIDADE_MAX_TEXT bytes. Names are 1 to
- * ALIDADE_MAX_NAME printable ASCII characters without blanks. Texts of the table live as long as
- * the library, texts of a description as long as the instance, and error_text until the next call
- * in that thread. A null text is "".
+ * ALIDADE_MAX_NAME printable ASCII characters without blanks. Texts of the table are valid as long
+ * as the library is loaded, texts of a description as long as the instance exists, and error_text
+ * until the next call in the same thread. A null text means "".
  *
  * Numbers. Matrices are row-major with an explicit row stride, in doubles. Jacobians are in the
- * tangent of each block. Angles are in rad, lengths in m, times in s, unless a unit differs.
- * Quaternions and directions are of unit length to 1e-9, of either sign.
+ * tangent space of each block. Angles are in rad, lengths in m, times in s, unless another unit is
+ * stated. Quaternions and directions have unit length to 1e-9. Quaternions may have either sign.
  *
  * Calls. The caller owns all buffers. Outputs overlap neither inputs nor each other. Pointers are
- * aligned to 8 bytes, payloads to 64. Outputs are uninitialised on entry. A call that returns
- * ALIDADE_OK has written every element of its outputs, including zeros: both triangles of L, all of
- * F, G, B and each Jacobian. `alidade check` finds elements that were not written. A call that
- * returns another code has written nothing. Codes 4 to 15 are reserved; a host treats an unknown
- * code as ALIDADE_ERROR. Inputs are not written. Calls do not throw. The host calls with rounding
- * to nearest, without traps and without flushing subnormal numbers; a call must not change these
- * settings. All calls on an instance end before `destroy`. `dt_s` is at least 0, but may be
- * negative in `step` without noise, by which a host predicts backwards. */
+ * aligned to 8 bytes, payloads to 64 bytes. Outputs are uninitialised before a call. A call that
+ * returns ALIDADE_OK has written every element of its outputs, including zeros: both triangles of
+ * L, all of F, G, B and each Jacobian. `alidade check` finds elements that were not written. A call
+ * that returns another code has not written any output. Codes 4 to 15 are reserved; a host treats
+ * an unknown code as ALIDADE_ERROR. Calls do not write to inputs and do not throw. During a call,
+ * the processor rounds to nearest, does not trap, and does not flush subnormal numbers to zero. A
+ * call must not change these settings. All calls on an instance end before `destroy` is called.
+ * `dt_s` is at least 0. The exception is a `step` without noise: `dt_s` may be negative, so that a
+ * host can predict backwards. */
 
 #include <stddef.h>
 #include <stdint.h>
@@ -50,33 +52,33 @@ extern "C" {
 #define ALIDADE_MAGIC 0x4144494cu /* "LIDA" */
 #define ALIDADE_ENTRY_SYMBOL "alidade_plugin"
 #define ALIDADE_BUILD_TAG_SECTION ".alidade"
-/* Optional section that contains the names of all entries, each followed by a zero, and nothing
- * else. A host need not load a plugin for names that are not listed. */
+/* Optional section that contains only the names of all entries, each followed by a zero byte. A
+ * host need not load a plugin to look for a name that is not listed. */
 #define ALIDADE_NAMES_SECTION ".alidade_names"
 
 /* Upper half of every word of flags. */
 #define ALIDADE_MUST_UNDERSTAND 0xffff0000u
-/* True if a struct from the other side is large enough to contain `member`. */
+/* True if `*p`, a struct from the other side, is large enough to contain `member`. */
 #define ALIDADE_HAS(p, type, member) \
   ((p)->struct_size >= offsetof(type, member) + sizeof((p)->member))
 
 /* Limits that both sides rely on. */
 enum {
   ALIDADE_MAX_ENTRIES = 1024,
-  ALIDADE_MAX_ROLES = 64, /* and blocks of a motion model */
+  ALIDADE_MAX_ROLES = 64, /* roles of a sensor, and blocks of a motion model */
   ALIDADE_MAX_NAME = 128,
   ALIDADE_MAX_TEXT = 4096,
   ALIDADE_MAX_PARAMS = 4096,
   ALIDADE_MAX_CHOICES = 256,
-  ALIDADE_MAX_SIZE = 1 << 20 /* ambient, tangent, n_w, prior, known */
+  ALIDADE_MAX_SIZE = 1 << 20 /* ambient and tangent size, n_w, number of prior and known numbers */
 };
 
 /* Result of an evaluation. */
 enum {
   ALIDADE_OK = 0,
   ALIDADE_OUT_OF_DOMAIN = 1, /* the arguments are outside the domain: behind the camera, Z <= 0 */
-  ALIDADE_INVALID = 2,       /* the measurement itself is unusable: beyond the sensor's limits */
-  ALIDADE_ERROR = 3          /* the plugin failed (an exception was caught); see error_text */
+  ALIDADE_INVALID = 2,       /* the measurement is unusable, such as beyond the sensor's limits */
+  ALIDADE_ERROR = 3          /* the plugin failed, for example by an exception; see error_text */
 };
 
 /* Reserved function pointer; null in this version. */
@@ -84,7 +86,7 @@ typedef void (*AlidadeReservedCall)(void);
 
 enum { ALIDADE_PLUGIN_C_ABI = 1, ALIDADE_PLUGIN_CPP = 2 };
 
-/* Bits of AlidadeBuildTag.flags that some compilers of plugins set. A host ignores them. */
+/* Bits of AlidadeBuildTag.flags that some plugins set. A host ignores these bits. */
 enum {
   ALIDADE_BUILT_UNOPTIMISED = 1,
   ALIDADE_BUILT_FAST_MATH = 1 << 16,
@@ -92,7 +94,7 @@ enum {
 };
 
 /* Bits of AlidadeBuildTag.isa: the features of the processor that the code needs beyond the
- * baseline. Every feature is listed separately. A host refuses an unknown bit. */
+ * baseline. Every feature has its own bit. A host rejects an unknown bit. */
 enum {
   ALIDADE_ISA_SSE3 = 1 << 0,
   ALIDADE_ISA_SSSE3 = 1 << 1,
@@ -122,43 +124,43 @@ enum {
   ALIDADE_ISA_AVX512FP16 = 1 << 25,
   ALIDADE_ISA_AVXVNNI = 1 << 26,
   ALIDADE_ISA_GFNI = 1 << 27,
-  ALIDADE_ISA_OTHER = 1 << 30 /* any other that compilers use by themselves: all hosts refuse it */
+  ALIDADE_ISA_OTHER = 1 << 30 /* any other feature that a compiler may use; all hosts reject it */
 };
 
 /* The only content of the section `.alidade`. */
 typedef struct AlidadeBuildTag {
-  char magic[8]; /* "ALIDADE" and a zero */
+  char magic[8]; /* "ALIDADE" and a zero byte */
   uint32_t struct_size;
-  uint16_t abi_major, abi_minor; /* of the header that the plugin was compiled with */
-  uint16_t needs_minor;          /* lowest minor version of a host that computes correctly */
+  uint16_t abi_major, abi_minor; /* version of the header that the plugin includes */
+  uint16_t needs_minor;          /* lowest minor version of a host for this plugin */
   uint16_t reserved0;
   uint32_t kind, flags, isa;
   uint32_t cplusplus; /* __cplusplus */
   char compiler[64];  /* __VERSION__ */
-  char build[160];    /* C++ plugin: text that must equal the host's; else empty */
+  char build[160];    /* C++ plugin: must equal the text of the host; else empty */
   uint32_t reserved[7];
 } AlidadeBuildTag;
 
 /* ---- geometries ------------------------------------------------------------------------------ */
 
-/* x (+) d moves x by d in its tangent. y (-) x is the shortest d with x (+) d = y.
+/* x (+) d moves x by the tangent vector d. y (-) x is the shortest d with x (+) d = y.
  *
  * ALIDADE_VECTOR           ambient n, tangent n      x (+) d = x + d
- * ALIDADE_ANGLE            ambient 1, tangent 1      the same, wrapped to (-pi, pi]
+ * ALIDADE_ANGLE            ambient 1, tangent 1      x (+) d = x + d, wrapped to (-pi, pi]
  * ALIDADE_UNIT_QUATERNION  ambient 4, tangent 3      w x y z, Hamilton; x (+) d = x Exp(d),
  *                                                    Exp(d) = (cos |d|/2, sin(|d|/2) d / |d|)
  * ALIDADE_UNIT_VECTOR      ambient 3, tangent 2      x (+) d = cos |d| x + sin |d| / |d| B(x) d
  * ALIDADE_PRODUCT          sums of the parts         the parts one after the other, each with its
- *                                                    (+); only for a measurement
+ *                                                    own (+); only for measurements
  *
- * B(x) of a unit vector, with s = -1 if x2 < 0, else 1 (also at x2 = -0), a = -1 / (s + x2):
+ * B(x) of a unit vector, with s = -1 if x2 < 0, else s = 1 (also for x2 = -0), a = -1 / (s + x2):
  *
  *            [ 1 + s x0^2 a    x0 x1 a     ]
  *   B(x)  =  [ s x0 x1 a       s + x1^2 a  ]
  *            [ -s x0           -x1         ]
  *
- * If y is the antipode of x, to which all ways are equally short, y (-) x = (pi, 0).
- * docs/plugin_abi.md has a worked example of each. */
+ * If y is the antipode of x, all ways from x to y are equally short, and y (-) x = (pi, 0).
+ * docs/plugin_abi.md contains an example of each geometry. */
 enum {
   ALIDADE_VECTOR = 1,
   ALIDADE_ANGLE = 2,
@@ -169,38 +171,38 @@ enum {
 
 /* Bits of AlidadeSpace.flags. */
 enum {
-  ALIDADE_ROLE_OPTIONAL = 1 << 16, /* may be unbound: its pointer is then null */
+  ALIDADE_ROLE_OPTIONAL = 1 << 16, /* may have no block; its pointer is then null */
   ALIDADE_ROLE_OWNED = 1 << 17,    /* the block belongs to the model: a bias, an extrinsic */
-  ALIDADE_ROLE_LANDMARK = 1 << 18, /* bound for each measurement, by its landmark id */
-  ALIDADE_ROLE_SHARED = 1 << 19,   /* with LANDMARK: one block for all landmarks that are first
-                                      seen at the same timestamp */
-  ALIDADE_ROLE_CLONE = 1 << 20     /* the value at the earlier timestamp of the observation */
+  ALIDADE_ROLE_LANDMARK = 1 << 18, /* bound to the landmark that a measurement names */
+  ALIDADE_ROLE_SHARED = 1 << 19,   /* with LANDMARK: all landmarks that are first seen at the
+                                      same timestamp share one block */
+  ALIDADE_ROLE_CLONE = 1 << 20     /* the value at the earlier timestamp (span_s) */
 };
 
 enum { ALIDADE_STAYS = 0, ALIDADE_RANDOM_WALK = 1, ALIDADE_GAUSS_MARKOV = 2 };
 
-/* Prior and dynamics of a role with ALIDADE_ROLE_OWNED; a config may override each. */
+/* Prior and dynamics of a role with ALIDADE_ROLE_OWNED. A config may override each of them. */
 typedef struct AlidadeOwned {
   uint32_t struct_size, dynamics;
   const double* mean;         /* ambient; null: the neutral element */
   const double* sqrt_prior;   /* L with P = L L', tangent x tangent; null: known exactly */
-  const double* sqrt_density; /* L of the driving white noise, per sqrt(s); null: none */
-  double time_constant_s;     /* of ALIDADE_GAUSS_MARKOV */
+  const double* sqrt_density; /* L of the driving white noise, per sqrt(s); null: zero */
+  double time_constant_s;     /* time constant of ALIDADE_GAUSS_MARKOV */
   void* reserved[4];
 } AlidadeOwned;
 
-/* A role, a measurement or a control input: a named quantity with its geometry. */
+/* Quantity with a name and a geometry: a role, a measurement or a control input. */
 typedef struct AlidadeSpace {
   uint32_t struct_size, geometry;
   int32_t ambient, tangent;
   uint32_t flags, reserved0;
   const char* name;
-  const char* unit; /* of every element; "" for a quantity without unit */
+  const char* unit; /* unit of every element; "" for a quantity without unit */
   const char*
       elements; /* names of the ambient elements, comma separated; "" for a single element */
   const char* doc;
-  const AlidadeOwned* owned;        /* null: at the neutral element, constant, known exactly */
-  const struct AlidadeSpace* parts; /* of a product: 1 to ALIDADE_MAX_ROLES, not products */
+  const AlidadeOwned* owned;        /* null: constant at the neutral element, known exactly */
+  const struct AlidadeSpace* parts; /* parts of a product: 1 to ALIDADE_MAX_ROLES, not products */
   uint32_t part_count, part_stride;
   void* reserved[1];
 } AlidadeSpace;
@@ -213,7 +215,7 @@ enum {
   ALIDADE_PARAM_FLAG = 3,
   ALIDADE_PARAM_CHOICE = 4, /* read as the index into `choices`; `count` is 1 */
   ALIDADE_PARAM_TEXT = 5,   /* read by read_text; `count` is 1 */
-  ALIDADE_PARAM_FILE = 6    /* like TEXT: the absolute path of a file that can be read */
+  ALIDADE_PARAM_FILE = 6    /* like TEXT; the text is the absolute path of a readable file */
 };
 
 /* Bits of AlidadeParam.flags. */
@@ -224,61 +226,61 @@ enum {
   ALIDADE_PARAM_OR_NONE = 1 << 19 /* a number, or the word `none`, which is read as infinity */
 };
 
-/* Declaration of a parameter. The plugin declares it when it reads it. */
+/* Declaration of a parameter. To read a parameter, the plugin passes its declaration. */
 typedef struct AlidadeParam {
   uint32_t struct_size, kind;
-  const char* key; /* a name; may be dotted: `noise.acceleration` */
+  const char* key; /* name; may contain dots: `noise.acceleration` */
   const char* unit;
   const char* doc;
   int32_t count; /* number of values; -1: a list of any length */
   uint32_t flags;
   double low, high;
   const double*
-      fallback; /* `count` defaults, if ALIDADE_PARAM_HAS_DEFAULT; of a choice: an index */
+      fallback; /* `count` defaults, if ALIDADE_PARAM_HAS_DEFAULT; an index for a choice */
   const char* const* choices;
   int32_t choice_count, reserved0;
-  const char* fallback_text; /* of a text or file */
+  const char* fallback_text; /* default of a text or file */
   void* reserved[4];
 } AlidadeParam;
 
 /* Functions of the host that `create` may call, in the thread that creates the model. A plugin must
- * not use it after `create` has returned. */
+ * not use the struct after `create` has returned. */
 typedef struct AlidadeHost {
   uint32_t struct_size;
   uint16_t abi_major, abi_minor;
   void* context;
-  /* Writes at most `capacity` values and returns the number of values in the config, or -1 if the
-   * host recorded an error. After -1 the model continues with any valid value: the host refuses it
-   * afterwards. */
+  /* Reads a parameter: writes at most `capacity` values and returns the number of values in the
+   * config. Returns -1 if the host recorded an error. The plugin then continues with any valid
+   * value, and the host rejects the model afterwards. */
   int32_t (*read)(void* context, const AlidadeParam* param, double* values, int32_t capacity);
-  /* Reads a text or file: writes at most `capacity` bytes, the last of which is 0, and returns the
-   * length without that zero. */
+  /* Reads a text or file: writes at most `capacity` bytes, of which the last is 0. Returns the
+   * length without this zero. */
   int32_t (*read_text)(void* context, const AlidadeParam* param, char* text, int32_t capacity);
-  /* Reports that parameters are not consistent; `key` may be "". */
+  /* Reports an error, such as parameters that contradict each other. `key` may be "". */
   void (*fail)(void* context, const char* key, const char* text);
   AlidadeReservedCall reserved[8];
 } AlidadeHost;
 
 /* ---- models ---------------------------------------------------------------------------------- */
 
-/* 3 is reserved. */
+/* Kinds of models. The value 3 is reserved. */
 enum { ALIDADE_KIND_SENSOR = 1, ALIDADE_KIND_MOTION = 2 };
 
-/* Bits of AlidadeDescription.capabilities. The lower half are hints; a host must honour the upper
- * half. */
+/* Bits of AlidadeDescription.capabilities. The lower half are hints. A host must support every bit
+ * of the upper half that is set. */
 enum {
   ALIDADE_ANALYTIC_JACOBIAN = 1, /* analytic Jacobians; else automatic differentiation */
-  ALIDADE_STATIONARY = 2,        /* motion: x' = x without noise; step need not be called */
-  /* motion: the four bits from this one on contain N, if `step` without noise is additive in dt up
-   * to an error of order dt^N; 0: it is additive */
+  ALIDADE_STATIONARY = 2,        /* motion: x' = x and no noise; step need not be called */
+  /* motion: four bits from this bit on contain N. `step` without noise is additive in dt up to an
+   * error of order dt^N. N = 0: `step` is exactly additive. */
   ALIDADE_STEP_ORDER_SHIFT = 4,
   ALIDADE_CAN_INITIALISE = 1 << 16,
   ALIDADE_HAS_VALIDITY = 1 << 17,
-  ALIDADE_RESIDUAL_ONLY = 1 << 18, /* recursive estimators refuse it */
-  ALIDADE_NEEDS_PAYLOAD = 1 << 19, /* needs the payload: an image patch, a scan */
-  /* motion: discrete white noise: w is constant between two updates of the state by measurements,
-   * however many steps lie between them. Without this bit: continuous white noise, whose w of each
-   * step is independent of all other steps. */
+  ALIDADE_RESIDUAL_ONLY = 1 << 18, /* recursive estimators reject such a sensor */
+  ALIDADE_NEEDS_PAYLOAD = 1 << 19, /* needs a payload, such as an image patch */
+  /* motion: the white noise is discrete. w is then constant between two updates of the state by
+   * measurements, also over several steps. Without this bit, the white noise is continuous: the w
+   * of each step is independent of all other steps. */
   ALIDADE_DISCRETE_NOISE = 1 << 20
 };
 
@@ -286,15 +288,15 @@ typedef struct AlidadeDescription {
   uint32_t struct_size, capabilities, role_count;
   uint32_t role_stride; /* bytes from one role to the next */
   const AlidadeSpace* roles;
-  const AlidadeSpace* output;   /* sensor: its measurement; else null */
-  const AlidadeSpace* residual; /* space of r, and of the noise of sqrt_noise; null: as output */
-  const AlidadeSpace* known;    /* sensor: numbers that come with each measurement; null: none */
-  const AlidadeSpace* inputs;   /* motion: its control inputs */
+  const AlidadeSpace* output;   /* sensor: the measurement; motion: null */
+  const AlidadeSpace* residual; /* space of r, and of the noise of sqrt_noise; null: output */
+  const AlidadeSpace* known;    /* sensor: known numbers of each measurement; null: none */
+  const AlidadeSpace* inputs;   /* motion: control inputs */
   uint32_t input_count, input_stride;
   int32_t noise_count;          /* motion: n_w */
   int32_t initialise_role;      /* the role that `initialise` computes, if it exists */
   const uint8_t* step_sparsity; /* motion: n x n, 1 if F may be non-zero; null: dense */
-  int32_t prior_count;          /* numbers that `initialise` needs besides the measurement */
+  int32_t prior_count;          /* number of prior values that `initialise` needs */
   int32_t reserved0;
   void* reserved[6];
 } AlidadeDescription;
@@ -306,86 +308,87 @@ enum {
   ALIDADE_PAYLOAD_POINTS_F32 = 4
 };
 
-/* Data that come with a measurement besides its numbers. */
+/* Data of a measurement besides its numbers, such as an image. */
 typedef struct AlidadePayload {
   uint32_t struct_size, kind;
   const void* data;
   uint64_t bytes;
-  int64_t row_bytes;               /* of an image: from one row to the next */
-  int32_t width, height, channels; /* of points: their count, 1, numbers for each point */
+  int64_t row_bytes;               /* image: distance between rows */
+  int32_t width, height, channels; /* points: their number, 1, numbers for each point */
   int32_t reserved0;
   void* reserved[4];
 } AlidadePayload;
 
-/* One measurement. It is valid for the duration of a call. */
+/* One measurement. The struct is valid only during a call. */
 typedef struct AlidadeObservation {
   uint32_t struct_size, flags;
   const double* z;     /* ambient; null if only a prediction is requested */
-  const double* known; /* described by description.known; null without it */
-  double offset_s;     /* its timestamp minus that of the roles: 0 except within a scan */
-  double span_s;       /* its timestamp minus that of the roles with ALIDADE_ROLE_CLONE */
+  const double* known; /* described by description.known; null if that is null */
+  double offset_s;     /* timestamp of z minus that of the roles; not 0 only in a scan */
+  double span_s;       /* timestamp of z minus that of roles with ALIDADE_ROLE_CLONE */
   const AlidadePayload* payloads;
   uint32_t payload_count, payload_stride;
   void* reserved[4];
 } AlidadeObservation;
 
-/* z = h(roles). `roles[i]` is the ambient value of role i, null for an unbound optional role.
- * `jacobians` may be null; `jacobians[i]` (tangent of z  x  tangent of role i) may be null. `seen`
- * is never null. */
+/* Functions of a sensor z = h(roles). `roles[i]` is the ambient value of role i, or null for an
+ * optional role without a block. `jacobians` may be null. Each `jacobians[i]` (tangent size of z  x
+ * tangent size of role i) may also be null. `seen` is never null. */
 typedef struct AlidadeSensor {
   uint32_t struct_size, reserved0;
   int32_t (*eval)(const void* self, const AlidadeObservation* seen, const double* const* roles,
                   double* z, double* const* jacobians, const int32_t* row_strides);
-  /* L with R = L L', tangent of z squared. */
+  /* Computes L of R = L L', a square matrix of the tangent size of z. */
   int32_t (*sqrt_noise)(const void* self, const AlidadeObservation* seen,
                         const double* const* roles, double* l, int32_t row_stride);
-  /* ALIDADE_OK or ALIDADE_INVALID; null: every measurement is valid. */
+  /* Returns ALIDADE_OK or ALIDADE_INVALID. Null: every measurement is valid. */
   int32_t (*valid)(const void* self, const AlidadeObservation* seen);
-  /* Inverse measurement model: y, the value of role `initialise_role`, from the other roles, z and
-   * a prior of the part that z does not determine (null if z determines all of y). If that role has
-   * ALIDADE_ROLE_LANDMARK, y contains this role and the landmark roles that follow, one after the
-   * other. Jacobians jx[i] of y by the other roles, jz by z, jp by the prior; each may be null. */
+  /* Inverse measurement model: computes y, the value of the role `initialise_role`, from the other
+   * roles, z and the prior. The prior contains the numbers that z does not determine, and is null
+   * if z determines all of y. If the role has ALIDADE_ROLE_LANDMARK, y contains the values of this
+   * role and of the landmark roles that follow, one after the other. Also computes the Jacobians of
+   * y: jx[i] by the other roles, jz by z, jp by the prior. Each of them may be null. */
   int32_t (*initialise)(const void* self, const AlidadeObservation* seen,
                         const double* const* roles, const double* prior, double* y,
                         double* const* jx, const int32_t* jx_strides, double* jz, int32_t jz_stride,
                         double* jp, int32_t jp_stride);
-  /* Only with ALIDADE_RESIDUAL_ONLY: r(roles, z) and its Jacobians. */
+  /* Only with ALIDADE_RESIDUAL_ONLY: computes r(roles, z) and its Jacobians. */
   int32_t (*residual)(const void* self, const AlidadeObservation* seen, const double* const* roles,
                       double* r, double* const* jacobians, const int32_t* row_strides);
   AlidadeReservedCall reserved[6];
 } AlidadeSensor;
 
-/* x' = f(x, u, w, dt), w ~ N(0, Qw). n is the sum of the blocks' tangent sizes, n_u that of the
- * control inputs. */
+/* Functions of a motion model x' = f(x, u, w, dt), w ~ N(0, Qw). n is the sum of the tangent sizes
+ * of the blocks, and n_u the sum of the tangent sizes of the control inputs. */
 typedef struct AlidadeMotion {
   uint32_t struct_size, reserved0;
-  /* `w` may be null (zero); `f` (n x n, d x'/d x), `g` (n x n_w, d x'/d w) and `b` (n x n_u,
-   * d x'/d u) may be null. */
+  /* Computes x' and the Jacobians `f` = d x'/d x (n x n), `g` = d x'/d w (n x n_w) and
+   * `b` = d x'/d u (n x n_u). `f`, `g` and `b` may be null. A null `w` means w = 0. */
   int32_t (*step)(const void* self, const double* const* blocks, const double* const* inputs,
                   const double* w, double dt_s, double* const* next, double* f, int32_t f_stride,
                   double* g, int32_t g_stride, double* b, int32_t b_stride);
-  /* L with Qw = L L', n_w x n_w. */
+  /* Computes L of Qw = L L', n_w x n_w. */
   int32_t (*sqrt_q)(const void* self, const double* const* blocks, const double* const* inputs,
                     double dt_s, double* l, int32_t row_stride);
   AlidadeReservedCall reserved[6];
 } AlidadeMotion;
 
-/* One model. The host zeroes it and sets struct_size; `create` fills it. */
+/* One model. The host sets all members to zero and sets struct_size. `create` sets the others. */
 typedef struct AlidadeInstance {
   uint32_t struct_size, kind;
   void* self;
   void (*destroy)(void* self);
-  const char* (*error_text)(const void* self); /* of the last ALIDADE_ERROR in this thread */
-  const AlidadeDescription* description;       /* lives as long as self */
-  const AlidadeSensor* sensor; /* `sensor` or `motion` by `kind`; the other is null */
+  const char* (*error_text)(const void* self); /* text of the last ALIDADE_ERROR in this thread */
+  const AlidadeDescription* description;       /* valid as long as self */
+  const AlidadeSensor* sensor; /* `kind` determines whether sensor or motion is set */
   const AlidadeMotion* motion;
   void* reserved[8];
 } AlidadeInstance;
 
 /* Bits of AlidadeEntry.thread_flags. */
 enum {
-  ALIDADE_THREAD_INSTANCES = 1, /* several instances may work at once */
-  ALIDADE_THREAD_CALLS = 2      /* one instance may be called from several threads at once */
+  ALIDADE_THREAD_INSTANCES = 1, /* several instances may be used at the same time */
+  ALIDADE_THREAD_CALLS = 2      /* several threads may call one instance at once */
 };
 
 typedef struct AlidadeEntry {
@@ -394,7 +397,7 @@ typedef struct AlidadeEntry {
   const char* name;
   const char* doc;
   const char* citation;
-  const char* version; /* of the model; may be "" */
+  const char* version; /* version of the model; may be "" */
   uint32_t thread_flags, flags;
   /* Reads the parameters and fills `instance`. Returns ALIDADE_OK or ALIDADE_ERROR. */
   int32_t (*create)(const AlidadeHost* host, AlidadeInstance* instance);

@@ -10,8 +10,8 @@
 #include "alidade/model/autodiff_inverse.h"
 #include "alidade/model/plugin_abi.h"
 
-/// Functions of plugin_abi.h that call a model. They are noexcept: an exception becomes
-/// ALIDADE_ERROR.
+/// Functions that implement plugin_abi.h by calls of a model. They are noexcept and convert an
+/// exception to ALIDADE_ERROR.
 namespace alidade {
 namespace detail {
 
@@ -54,7 +54,7 @@ struct AbiPrior {
   AlidadeOwned c{};
 };
 
-/// A model with its description: the instance's `self`.
+/// Model with its description. AlidadeInstance::self points to it.
 template <class Model>
 struct Holder {
   explicit Holder(Params& p) : Holder(Model(p)) {}
@@ -65,7 +65,7 @@ struct Holder {
   template <class Quantities>
   void DescribeRoles(const Quantities& quantities) {
     static_assert(std::tuple_size<Quantities>::value == Blocks<Model>::kCount,
-                  "one Quantity for each role or block");
+                  "kRoles or kBlocks needs one Quantity for each role or block");
     const auto describe = [&](auto index) {
       constexpr int i = decltype(index)::value;
       using G = SpaceAt<i, Model>;
@@ -87,7 +87,7 @@ struct Holder {
     space = Describe(measurement, Z::kGeometry, Z::kAmbient, Z::kTangent);
     if constexpr (Z::kGeometry == ALIDADE_PRODUCT) {
       constexpr auto quantities = Model::kParts;
-      static_assert(quantities.size() == Z::kParts, "one Quantity in kParts for each part");
+      static_assert(quantities.size() == Z::kParts, "kParts needs one Quantity for each part");
       parts.reserve(Z::kParts);
       Z::ForEachPart([&](auto part, int, int) {
         using G = decltype(part);
@@ -100,7 +100,7 @@ struct Holder {
     description.output = &space;
   }
 
-  /// Describes prior and dynamics of the roles that are states of the sensor itself.
+  /// Describes prior and dynamics of the roles that are model parameter states of the sensor.
   void DescribeOwned() {
     if constexpr (HasOwnedRole<Model>::value) {
       for (int i = 0; i < Blocks<Model>::kCount; ++i) {
@@ -112,7 +112,7 @@ struct Holder {
         if (!has_valid_size(prior.mean, roles[i].ambient) ||
             !has_valid_size(prior.sigma, roles[i].tangent) ||
             !has_valid_size(prior.density, roles[i].tangent)) {
-          prior = Owned{ALIDADE_STAYS, {std::nan("")}, {}, {}, 0.0};  // the host refuses this mean
+          prior = Owned{ALIDADE_STAYS, {std::nan("")}, {}, {}, 0.0};  // the host rejects this mean
           prior.mean.resize(static_cast<std::size_t>(roles[i].ambient));
         }
         priors[i] = std::make_unique<AbiPrior>(std::move(prior));
@@ -120,10 +120,10 @@ struct Holder {
       }
     }
   }
-  /// Describes the numbers that come with each measurement.
+  /// Describes the known numbers of each measurement.
   void DescribeKnown() {
     using Known = typename Model::Known;
-    static_assert(Known::kGeometry == ALIDADE_VECTOR, "known numbers are a vector");
+    static_assert(Known::kGeometry == ALIDADE_VECTOR, "known numbers must be a vector");
     if constexpr (kHasKnown<Model>) {
       constexpr Quantity quantity = Model::kKnown;
       known = Describe(quantity, Known::kGeometry, Known::kAmbient, Known::kTangent);
@@ -135,12 +135,12 @@ struct Holder {
   AlidadeDescription description{};
   AlidadeSpace roles[Blocks<Model>::kCount];
   AlidadeSpace space;               ///< the measurement, or the control input
-  AlidadeSpace known;               ///< of a sensor
-  std::vector<AlidadeSpace> parts;  ///< of the measurement
+  AlidadeSpace known;               ///< known numbers of a sensor
+  std::vector<AlidadeSpace> parts;  ///< parts of the measurement
   std::unique_ptr<AbiPrior> priors[Blocks<Model>::kCount];
 };
 
-/// Text of the last ALIDADE_ERROR of this thread. Hidden, so that each plugin has a separate one.
+/// Text of the last ALIDADE_ERROR in this thread. Hidden, so that each plugin has its own text.
 struct __attribute__((visibility("hidden"))) LastError {
   static char* Text() {
     static thread_local char text[256] = "";
@@ -149,7 +149,8 @@ struct __attribute__((visibility("hidden"))) LastError {
   static void Set(const char* text) { std::snprintf(Text(), 256, "%s", text); }
 };
 
-/// Calls f with the model that `self` points to. An exception becomes ALIDADE_ERROR and its text.
+/// Calls f with the model that `self` points to. Converts an exception to ALIDADE_ERROR and stores
+/// its text in LastError.
 template <class Model, class F>
 std::int32_t CallGuarded(const void* self, const F& f) noexcept {
   const auto* holder = static_cast<const Holder<Model>*>(self);
@@ -167,14 +168,14 @@ std::int32_t CallGuarded(const void* self, const F& f) noexcept {
 #endif
 }
 
-/// Returns the known numbers, or null without an access if the model does not use any.
+/// Returns the known numbers. If the model uses none, returns null without reading `observation`.
 template <class Model>
 const double* KnownOf(const AlidadeObservation* observation) {
   return kHasKnown<Model> ? observation->known : nullptr;
 }
 
-/// Functions of a sensor for the ABI. Hidden, like MotionCalls. If its table were exported, two
-/// plugins with a struct of the same name would share the table of the first (STB_GNU_UNIQUE). The
+/// ABI functions of a sensor. Hidden, like MotionCalls. If kCalls were exported, two plugins with a
+/// struct of the same name would both use the kCalls of the first plugin (STB_GNU_UNIQUE). The
 /// flags of dlopen cannot prevent this.
 template <class Model>
 struct __attribute__((visibility("hidden"))) SensorCalls {
@@ -238,7 +239,7 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
                                         {}};
 };
 
-/// Functions of a motion model for the ABI.
+/// ABI functions of a motion model.
 template <class Model>
 struct __attribute__((visibility("hidden"))) MotionCalls {
   ALIDADE_FLATTEN static std::int32_t Step(const void* self, const double* const* blocks,

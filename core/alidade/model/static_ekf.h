@@ -11,8 +11,9 @@
 
 #include "alidade/model/autodiff.h"
 
-/// A filter whose models are combined at compile time. It needs C++17 and Eigen, but no plugins,
-/// config, allocation or exceptions. It serves embedded systems, and as a baseline of the engine.
+/// Filter whose models are combined at compile time, for embedded systems. It needs C++17 and
+/// Eigen, but no plugins, configs, memory allocation or exceptions. Benchmarks also compare the
+/// filters of a Problem with it.
 namespace alidade {
 
 /// Outcome of a measurement in StaticEkf::Update.
@@ -20,25 +21,26 @@ enum class StaticOutcome {
   kAccepted,
   kGated,
   kOutOfDomain,  ///< h is not defined at the prediction
-  kInvalid,      ///< beyond the sensor's limits
+  kInvalid,      ///< the measurement is beyond the limits of the sensor
   kNotFinite,    ///< S is not positive definite, or a result is not finite; x and P are unchanged
 };
 
-/// Extended Kalman filter over the blocks of `Motions`, numbered in order.
+/// Extended Kalman filter for the blocks of all motion models `Motions`. The blocks are numbered in
+/// the order of the models.
 ///
 ///   predict    x' = f(x, u, 0, dt),  P' = F P F' + G Q G'
 ///   update     S = H P H' + R,  K = P H' S^-1,  x' = x (+) K r,  P' = P - K S K'
 ///
 ///   symbol     shape                  meaning
-///   x          sum of ambient sizes   state; P, n x n, in its tangent, is its covariance
+///   x          sum of ambient sizes   state; P, n x n, is its covariance in the tangent space
 ///   r          m                      innovation z (-) h(x)
-///   gate       1                      bound on r' S^-1 r; infinity disables it
+///   gate       1                      largest accepted r' S^-1 r; infinity: no gate
 ///
-/// Each measurement is linearised at the state after the previous one, as the engine does under
-/// `fuse: per_measurement`. If a unit vector changes, P is rotated with its tangent basis, as the
-/// engine does. Sizes are known at compile time: Constant<1>, not Constant<>. The caller passes the
-/// control inputs to every Predict. Discrete noise is constant from one accepted measurement (or
-/// Set) to the next, as in Ekf.
+/// Each measurement is linearised at the state after the previous measurement, as in Ekf with
+/// `fuse: per_measurement`. If a unit vector changes, P is rotated with the tangent basis, as in
+/// Ekf. All sizes must be known at compile time: use Constant<1>, not Constant<>. The caller passes
+/// the control inputs to every Predict. Discrete noise is constant from one accepted measurement or
+/// call of Set to the next.
 template <class... Motions>
 class StaticEkf {
  public:
@@ -53,8 +55,8 @@ class StaticEkf {
 
   explicit StaticEkf(Motions... motions) : motions_(std::move(motions)...) {}
 
-  /// Sets block B to `value` (ambient) with the covariance `p` (tangent), uncorrelated with the
-  /// other blocks.
+  /// Sets block B to `value` (ambient) with the covariance `p` (tangent). The block is then
+  /// uncorrelated with the other blocks.
   template <int B, class Matrix>
   void Set(const double* value, const Eigen::MatrixBase<Matrix>& p) {
     constexpr int o = TangentOffset(B), k = Space<B>::kTangent;
@@ -67,7 +69,7 @@ class StaticEkf {
   /// Sets a scalar block to `value` with the standard deviation `sigma`.
   template <int B>
   void Set(double value, double sigma) {
-    static_assert(Space<B>::kTangent == 1 && Space<B>::kAmbient == 1, "a scalar block");
+    static_assert(Space<B>::kTangent == 1 && Space<B>::kAmbient == 1, "block B must be scalar");
     Set<B>(&value, Eigen::Matrix<double, 1, 1>::Constant(sigma * sigma));
   }
 
@@ -79,19 +81,20 @@ class StaticEkf {
   /// Returns P, n x n, in the order of the blocks.
   Covariance covariance() const { return p_.template selfadjointView<Eigen::Lower>(); }
 
-  /// Predicts by dt_s seconds. `u` are the control inputs (ambient, `const double*` each) of the
-  /// models that have one, in order. Returns kOutOfDomain if a model is not defined and kError if
-  /// x' or P' is not finite. x and P are then unchanged.
+  /// Predicts the state after dt_s seconds. `u` are the control inputs of the models that have a
+  /// control input, in the order of the models. Each is a `const double*` to ambient values.
+  /// Returns kOutOfDomain if a model is not defined at the state, and kError if x' or P' is not
+  /// finite. In both cases x and P are unchanged.
   template <class... Inputs>
   ALIDADE_FLATTEN Status Predict(double dt_s, Inputs... u) {
     static_assert(sizeof...(Inputs) == InputsBefore(sizeof...(Motions)),
-                  "one control input for each model that has one");
+                  "Predict needs one control input for each model with a control input");
     const double* const inputs[] = {u..., nullptr};
     return PredictAll(dt_s, inputs, std::index_sequence_for<Motions...>{});
   }
 
-  /// Updates with z, a measurement of `sensor` whose roles are bound to the blocks `Roles`. z is
-  /// ambient, followed by the known numbers if the sensor uses any.
+  /// Updates with z, a measurement of `sensor`. The roles of the sensor are bound to the blocks
+  /// `Roles`. z contains the ambient values, followed by the known numbers if the sensor uses any.
   template <int... Roles, class Model>
   ALIDADE_FLATTEN StaticOutcome Update(const Model& sensor, const double* z,
                                        double gate = std::numeric_limits<double>::infinity());
@@ -122,12 +125,13 @@ class StaticEkf {
     for (std::size_t i = 0; i < m; ++i) count += has_input[i] ? 1 : 0;
     return count;
   }
-  /// View of a matrix that a model has written. (Eigen requires column order for a single column.)
+  /// View of a matrix that a model has written. (Eigen requires column-major order for a single
+  /// column.)
   template <int R, int C>
   using RowMajorMap = Eigen::Map<
       const Eigen::Matrix<double, R, C, C == 1 && R != 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
 
-  /// Transition of N tangent elements: F and G Q G'.
+  /// Transition of N tangent elements: f = F and q = G Q G'.
   template <int N>
   struct Transition {
     Eigen::Matrix<double, N, N> f, q;
@@ -135,7 +139,7 @@ class StaticEkf {
   template <class Model>
   using TransitionOf = Transition<detail::Blocks<Model>::kTangent>;
 
-  /// Discrete noise over an interval: Lq at its start, and M = Cov(x, w).
+  /// Discrete noise over an interval: l is Lq at the start of the interval, and m is M = Cov(x, w).
   template <class Model>
   struct DiscreteNoise {
     Eigen::Matrix<double, Model::kNoise, Model::kNoise> l;
@@ -167,7 +171,7 @@ class StaticEkf {
     in_interval_ = true;
     return Status::kOk;
   }
-  /// Applies a change of x and P. Restores both and returns false if a result is not finite.
+  /// Applies a change of x and P. If a result is not finite, restores both and returns false.
   template <class Change>
   bool ApplyIfFinite(const Change& change);
   template <std::size_t M, class Noise>
@@ -176,7 +180,7 @@ class StaticEkf {
   }
   template <std::size_t M, int N, class Noise>
   Status StepModel(double dt_s, const double* u,
-                   double* next,  // NOLINT(readability-non-const-parameter): y points into it
+                   double* next,  // NOLINT(readability-non-const-parameter): y points to it
                    Transition<N>& transition, Noise& noise) const {
     using Model = std::tuple_element_t<M, std::tuple<Motions...>>;
     constexpr typename detail::Blocks<Model>::Indices indices{};
@@ -213,16 +217,17 @@ class StaticEkf {
     return Status::kOk;
   }
 
-  /// Returns P(i, j); only the lower triangle is stored.
+  /// Returns P(i, j), of which only the lower triangle is stored.
   double& P(int i, int j) { return i >= j ? p_(i, j) : p_(j, i); }
-  /// Updates P for the rows [O, O + N): P_aa <- F P_aa F' + Q, P_ai <- F P_ai.
+  /// Propagates P for the rows a = [O, O + N): P_aa <- F P_aa F' + Q, P_ai <- F P_ai for all other
+  /// rows i.
   template <int O, int N>
   void Propagate(const Transition<N>& t);
   template <int M>
   StaticOutcome Correct(const Eigen::Matrix<double, kTangent, M>& pht,
                         const Eigen::Matrix<double, M, M>& s, const Eigen::Matrix<double, M, 1>& r,
                         double gate);
-  /// Computes x <- x (+) dx and rotates P with the tangent planes of unit vectors.
+  /// Computes x <- x (+) dx, and rotates P with the tangent spaces of unit vectors.
   void ApplyCorrection(const double* dx) {
     const auto apply = [&](auto index) {
       constexpr int b = decltype(index)::value, n = Space<b>::kTangent;
@@ -243,12 +248,12 @@ class StaticEkf {
   std::tuple<Motions...> motions_;
   double x_[kAmbient] = {};
   Covariance p_ = Covariance::Zero();
-  std::tuple<DiscreteNoise<Motions>...> noise_;  ///< of the current interval
-  bool in_interval_ = false;                     ///< the last change of P was a prediction
+  std::tuple<DiscreteNoise<Motions>...> noise_;  ///< noise of the current interval
+  bool in_interval_ = false;                     ///< whether the last change of P was a prediction
 };
 
-// Unrolls a loop of constant length at any level of optimisation. Disabled under sanitizers, for
-// the same reason as ALIDADE_FLATTEN.
+// Unrolls a loop of constant length at any level of optimisation. Disabled if sanitizers are
+// active, for the same reason as ALIDADE_FLATTEN.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define ALIDADE_UNROLL
 #else
@@ -302,7 +307,7 @@ StaticOutcome StaticEkf<Motions...>::Update(const Model& sensor, const double* z
   using RoleBlocks = detail::Blocks<Model>;
   constexpr typename RoleBlocks::Indices indices{};
   constexpr int m = Z::kTangent, bound[] = {Roles...};
-  static_assert(sizeof...(Roles) == RoleBlocks::kCount, "one block for each role");
+  static_assert(sizeof...(Roles) == RoleBlocks::kCount, "Update needs one block for each role");
   if constexpr (detail::HasValid<Model>::value) {
     if (!detail::CallValid(sensor, z + Model::Measurement::kAmbient, z))
       return StaticOutcome::kInvalid;
@@ -328,7 +333,7 @@ StaticOutcome StaticEkf<Motions...>::Update(const Model& sensor, const double* z
   Eigen::Matrix<double, kTangent, m> pht;
   ALIDADE_UNROLL for (int i = 0; i < kTangent; ++i) {
     ALIDADE_UNROLL for (int c = 0; c < m; ++c) {
-      double sum = -0.0;  // neutral in a sum, also in its sign
+      double sum = -0.0;  // -0.0 + x is x, also if x is -0.0 or 0.0
       const auto add = [&](auto index) {
         constexpr int role = decltype(index)::value, o = TangentOffset(bound[role]);
         constexpr int n = detail::SpaceAt<role, Model>::kTangent;

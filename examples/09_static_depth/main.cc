@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The filter of example 05, composed at compile time: the models that the program loads as plugins
-// are plain structs here. It uses no plugins, config, allocation or exceptions.
+// The filter of example 05, composed at compile time. The models that the program `alidade` loads
+// as plugins are plain structs here. This program uses no plugins, config, allocation or
+// exceptions.
 #include <cmath>
 #include <cstdio>
 

@@ -5,11 +5,11 @@
 namespace static_depth {
 
 struct Row {
-  double disparity_px;   ///< 0: stereo is blind
-  double inverse_scale;  ///< template size / apparent size
+  double disparity_px;   ///< 0 if stereo is blind
+  double inverse_scale;  ///< template width / apparent width, both in px
 };
 
-inline constexpr double kStep = 0.033;  ///< s, between rows
+inline constexpr double kStep = 0.033;  ///< time between two rows, s
 
 inline constexpr Row kRows[] = {
     {0.00, 1.0072},  {84.93, 1.0272}, {81.72, 1.0779}, {80.36, 1.0796}, {76.93, 1.0986},

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A filter in your own program: push measurements as they arrive, read the estimate at any time.
-// Reads lines `t_s stream value` from standard input.
+// A filter in your own program. It pushes measurements as they arrive, and predicts the state.
+// The program reads lines `t_s stream value` from standard input.
 #include <alidade/experiment/experiment.h>
 #include <alidade/experiment/make_filter.h>
 
@@ -20,7 +20,7 @@ int main(int argc, char** argv) try {
     const alidade::Timestamp now = alidade::TimestampFromSeconds(t_s);
     const alidade::UpdateReport& report = filter->Push(now, {{filter->stream(stream), {value}}});
     for (const alidade::Event& event : report.events) std::cerr << event.text << '\n';
-    const alidade::State soon = filter->At(now + 50'000'000);  // a prediction; nothing is committed
+    const alidade::State soon = filter->At(now + 50'000'000);  // does not change the filter
     std::printf("%.3f s: in 50 ms the depth is %.3f +- %.3f m\n", t_s, soon.value(depth)[0],
                 soon.sigma(depth));
   }

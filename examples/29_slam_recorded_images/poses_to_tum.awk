@@ -1,4 +1,4 @@
-# Converts poses of 7-Scenes, files of 4 x 4 numbers (world_from_cam), to the TUM format:
+# Converts poses of 7-Scenes, which are files of 4 x 4 numbers (world_from_cam), to the TUM format:
 #   awk -f poses_to_tum.awk frame-*.pose.txt > truth.tum
 function root(s) { return s > 0 ? sqrt(s) / 2 : 0 }
 function sign(s) { return s < 0 ? -1 : 1 }

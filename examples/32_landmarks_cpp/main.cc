@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A filter with its own models and landmarks: a robot drives with odometry, measures points around
-// it, and maps them.
+// A filter with models of its own and with landmarks: a robot drives with odometry, measures the
+// points around it, and maps these points.
 #include <alidade/estimation.h>
 
 #include <array>
@@ -40,7 +40,7 @@ struct Robot : alidade::Motion<2, Vec<2>, Angle> {
   }
 };
 
-/// Point of the world in the robot's frame: ahead, to the left and up.
+/// Measures a point of the world in the frame of the robot: x ahead, y to the left, z up.
 struct PointInRobot : alidade::Sensor<Vec<3>, Vec<2>, Angle, Vec<3>> {
   static constexpr std::array kRoles{
       Quantity{"position", "m", "of the robot", "x,y"}, Quantity{"heading", "rad"},

@@ -144,7 +144,7 @@ TEST(CeresBundle, EndsAfterTheIterationWhereItIsTold) {
   const BundleResult result = Adjusted(problem, options);
   EXPECT_EQ(result.end, BundleEnd::kStopped);
   EXPECT_EQ(result.iterations, 2);
-  EXPECT_LT(BundleRms(*sensor, problem), 0.5 * before) << "what is reached is kept";
+  EXPECT_LT(BundleRms(*sensor, problem), 0.5 * before) << "the result of the iterations is kept";
 }
 
 // A very distant point makes the norm of all unknowns so large that every step is relatively small.
@@ -221,7 +221,7 @@ TEST(CeresBundle, ABalCameraSeesPointsBehindIt) {
   EXPECT_NEAR(BundleRms(*sensor, problem), after.Rms(), 1e-9 * after.Rms());
   EXPECT_NEAR(result.cost_after, 0.5 * after.squares, 1e-9 * after.squares);
   // Each coordinate of the noise has a mean square of 1/4.
-  EXPECT_LT(after.Rms(), std::sqrt(0.5)) << "below the noise: unknowns take a part of it";
+  EXPECT_LT(after.Rms(), std::sqrt(0.5)) << "the unknowns absorb a part of the noise";
 }
 
 /// If all residuals r exceed the scale of a loss, the loss is nearly proportional to |r|, and the

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tables and configs with a fault. The comment above a test has the number of its data fault.
+// Tests of tables and configs with a fault. The comment above a test contains the number of the
+// fault.
 #include <algorithm>
 
 #include "csv_fixture.h"
@@ -81,8 +82,8 @@ TEST_F(Csv, ReciprocalOfZero) {
 
 // Fault 33 of tests/faults/README.md.
 TEST_F(Csv, LineTooLong) {
-  // "0,1,2," and a number: 4096 bytes are accepted, one more is an error; the line end does not
-  // count.
+  // A row has three cells and a long number. 4096 bytes are accepted, one more is an error. The
+  // line end does not count.
   const auto row = [](std::size_t length) { return "0,1,2,3." + std::string(length - 8, '0'); };
   for (const std::string end : {"", "\n", "\r\n"}) {
     EXPECT_EQ(Frames(kHeader + row(4096) + end, kDepthConfig).size(), 1u);
@@ -94,8 +95,8 @@ TEST_F(Csv, LineTooLong) {
 }
 
 TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
-  // The buffer of 65536 bytes ends between the '\r' and the '\n' of a line of 4096 bytes. This is
-  // one line, and the next line has the right number.
+  // The buffer of 65536 bytes ends between the '\r' and the '\n' of a line of 4096 bytes. The line
+  // counts as one, so the next line has the correct number.
   std::string text = kHeader;
   while (text.size() + 4097 + 4000 < 65536) text += '#' + std::string(3998, ' ') + '\n';
   text += '#' + std::string(65536 - 4097 - 2 - text.size(), ' ') + '\n';

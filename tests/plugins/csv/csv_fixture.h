@@ -22,13 +22,13 @@ inline constexpr const char* kDepthConfig =
     "reciprocal: true}}\ntruth: {depth: reference_depth_m}\n";
 inline constexpr const char* kHeader = "t_s,disparity_px,scale,reference_depth_m\n";
 
-/// Test with its own folder, which contains `a.csv`.
+/// Test in a temporary folder, which contains `a.csv`.
 class Csv : public ::testing::Test {
  protected:
   fs::path File() const { return folder_ / "a.csv"; }
   void Write(const std::string& text) const { std::ofstream(File(), std::ios::binary) << text; }
 
-  /// Opens the source of `config_`, whose root is the `source` map.
+  /// Opens the source of `config`, which contains the keys of the `source` map.
   std::unique_ptr<Source> Open(const std::string& config = kDepthConfig) {
     config_ = std::make_unique<Config>(Config::FromText(config, "run.yaml"));
     return OpenConfig();
@@ -51,7 +51,7 @@ class Csv : public ::testing::Test {
     return Frames(config);
   }
 
-  /// Expects that `work` fails with `code` and with exactly `message`, in which FILE is replaced by
+  /// Expects that `work` fails with `code` and with exactly `message`. FILE in `message` stands for
   /// the path of a.csv.
   void ExpectError(ExitCode code, std::string message, const std::function<void()>& work) const {
     if (const auto at = message.find("FILE"); at != std::string::npos) {
@@ -75,7 +75,7 @@ class Csv : public ::testing::Test {
   }
 
   TemporaryFolder folder_;
-  bool any_order_ = false;  ///< set by the run's `out_of_sequence.policy`
+  bool any_order_ = false;  ///< true if `out_of_sequence.policy` allows any order
   std::unique_ptr<Config> config_;
 };
 
@@ -85,8 +85,7 @@ inline std::vector<Timestamp> Timestamps(const std::vector<SourceFrame>& frames)
   return timestamps;
 }
 
-/// Returns the measured streams and the known truth values of a frame, as `0 1
-/// 1`.
+/// Returns the indices of the measured streams and of the known true values of a frame: `0 1 | 1`.
 inline std::string Held(const SourceFrame& frame) {
   std::string held;
   for (const Measurement& m : frame.measurements) held += std::to_string(m.stream) + ' ';

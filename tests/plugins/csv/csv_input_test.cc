@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tables from files, from pipes and from standard input.
+// Tests of tables from files, from pipes and from standard input.
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/stat.h>
@@ -41,7 +41,7 @@ TEST_F(Csv, ReadsAPipeAsItIsWritten) {
   });
   const auto source = Open("path: a.csv\nstreams: {z: z}\n");
   SourceFrame frame;
-  EXPECT_TRUE(source->Next(frame));  // returns although the pipe is still open
+  EXPECT_TRUE(source->Next(frame));  // Next() returns although the pipe is still open
   writer.join();
   EXPECT_EQ(write(descriptor, ",2\n", 3), 3);
   EXPECT_TRUE(source->Next(frame));
@@ -52,7 +52,7 @@ TEST_F(Csv, ReadsAPipeAsItIsWritten) {
 
 TEST_F(Csv, ASignalEndsTheWaitForAPipe) {
   ASSERT_EQ(mkfifo(File().c_str(), 0600), 0);
-  const int both_ends = open(File().c_str(), O_RDWR);  // never reaches the end of file
+  const int both_ends = open(File().c_str(), O_RDWR);  // no end of file while a writer is open
   ASSERT_EQ(write(both_ends, "t_s,z\n", 6), 6);
   const auto source = Open("path: a.csv\nstreams: {z: z}\n");
   struct sigaction action {
@@ -79,7 +79,7 @@ TEST_F(Csv, RefusesWhatCannotBeRead) {
   fs::create_directory(File());
   expect("Is a directory");
   fs::remove(File());
-  if (geteuid() == 0) return;  // root may read everything
+  if (geteuid() == 0) return;  // permissions do not restrict root
   Write("t_s\n");
   fs::permissions(File(), fs::perms::none);
   expect("Permission denied");
@@ -98,7 +98,7 @@ TEST_F(Csv, NoticesAFileThatChangesWhileItIsRead) {
 }
 
 TEST_F(Csv, StreamsALongFileInConstantMemory) {
-  // A pipe of 2e6 rows, about 40 MB, written by a thread; the peak may grow by 4 MB.
+  // A thread writes 2e6 rows, about 40 MB, to a pipe. The peak memory may grow by 4 MB.
   const auto peak_kb = [] {
     std::ifstream status("/proc/self/status");
     for (std::string word; status >> word;) {

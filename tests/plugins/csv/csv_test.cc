@@ -44,7 +44,7 @@ TEST_F(Csv, GivesStreamsAndTruthsInTheOrderWritten) {
 }
 
 TEST_F(Csv, GainAndReciprocalScaleTheColumn) {
-  // 1000 mm = 1 m; 3 / 4 = 0.75.
+  // The expected values are 1000 mm = 1 m and 3 / 4 = 0.75.
   const auto frames = Frames("t_s,a,b\n0,1000,4\n",
                              "path: a.csv\nstreams: {m: {columns: a, gain: 1e-3}, r: {columns: "
                              "[b], reciprocal: true, gain: 3}}\n");
@@ -52,7 +52,8 @@ TEST_F(Csv, GainAndReciprocalScaleTheColumn) {
   EXPECT_DOUBLE_EQ(frames[0].measurements[1].values[0], 0.75);
 }
 
-// A range has the satellite's position as known numbers; if one is missing there is no measurement.
+// The known numbers of a range are the position of the satellite. If one of them is missing, there
+// is no measurement.
 TEST_F(Csv, ReadsKnownNumbersWithAMeasurement) {
   const std::string config =
       "path: a.csv\nstreams: {range: {columns: r, gain: 1e3, known: [x, y]}, other: r}\n";
@@ -63,14 +64,15 @@ TEST_F(Csv, ReadsKnownNumbersWithAMeasurement) {
   const auto frames = Frames("t_s,r,x,y\n0,21.5,1,2\n1,22,3,\n", config);
   ASSERT_EQ(Held(frames[0]), "0 1 |");
   EXPECT_EQ(frames[0].measurements[0].values, std::vector<double>{21500.0});
-  EXPECT_EQ(frames[0].measurements[0].known, (std::vector<double>{1.0, 2.0})) << "without the gain";
+  EXPECT_EQ(frames[0].measurements[0].known, (std::vector<double>{1.0, 2.0}))
+      << "the gain does not apply to known numbers";
   EXPECT_TRUE(frames[0].measurements[1].known.empty());
   ASSERT_EQ(Held(frames[1]), "1 |");
   EXPECT_TRUE(frames[1].measurements[0].known.empty());
 }
 
-// One row for each satellite: two at the first time and one at the second. The truth is that of the
-// first row that has it.
+// The table has a row for each satellite: two at the first time and one at the second. The true
+// value is that of the first row that contains one.
 TEST_F(Csv, RowsOfOneTimeAreOneFrameWhereTimesRepeat) {
   const std::string config =
       "path: a.csv\ntime: {column: t_s, repeats: true}\n"
@@ -79,7 +81,7 @@ TEST_F(Csv, RowsOfOneTimeAreOneFrameWhereTimesRepeat) {
   const auto source = Open(config);
   SourceFrame frame;
   ASSERT_TRUE(source->Next(frame));
-  EXPECT_EQ(source->place().line, 4) << "the last row of the frame, not the one behind it";
+  EXPECT_EQ(source->place().line, 4) << "the last row of the frame, not the row after it";
   ASSERT_EQ(Held(frame), "0 0 1 | 0");
   EXPECT_EQ(frame.measurements[0].values, std::vector<double>{21.0});
   EXPECT_EQ(frame.measurements[0].known, std::vector<double>{1.0});
@@ -95,7 +97,7 @@ TEST_F(Csv, RowsOfOneTimeAreOneFrameWhereTimesRepeat) {
 }
 
 // A bad value does not invalidate the previous frame. A row with an unreadable time may belong to
-// that frame, so the frame is withheld.
+// the previous frame, so this frame is not emitted.
 TEST_F(Csv, AFrameBeforeABadRowIsGivenOutWhereItIsWhole) {
   Write("t_s,r\n0,21\n0,22\n1,x\n");
   const auto source =
@@ -123,7 +125,7 @@ TEST_F(Csv, AcceptsCommentsCarriageReturnsAndByteOrderMark) {
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_EQ(frames[0].measurements[0].values[0], 1.5);
   EXPECT_EQ(frames[1].measurements[0].values[0], -2.0);
-  // complete, although the last line has no line feed
+  // The last row is complete, although the line has no line feed.
   EXPECT_EQ(frames[2].measurements[0].values[0], 0.5);
 }
 
@@ -190,7 +192,7 @@ TEST_F(Csv, TimeHasAUnit) {
 }
 
 TEST_F(Csv, TimeSince1970KeepsEveryNanosecond) {
-  // Doubles near 1.4e18 are 256 apart, near 1.4e9 they are 2.4e-7 apart.
+  // Near 1.4e18, adjacent doubles differ by 256. Near 1.4e9 they differ by 2.4e-7.
   const Timestamp first = 1'403'636'579'763'555'584;
   EXPECT_EQ(Timestamps(Frames("t,z\n1403636579763555584,1\n1403636579763555585,1\n",
                               "path: a.csv\ntime: {column: t, unit: ns}\nstreams: {z: z}\n")),
@@ -211,13 +213,13 @@ TEST_F(Csv, RateStandsInForTime) {
 
 TEST_F(Csv, NumbersDoNotDependOnTheLocale) {
   const CommaLocale comma;
-  if (!comma.active()) GTEST_SKIP() << "localedef is not here";
+  if (!comma.active()) GTEST_SKIP() << "localedef is not installed";
   EXPECT_EQ(Frames("t_s,z\n0.5,1.25\n", "path: a.csv\nstreams: {z: z}\n")[0].measurements[0].values,
             std::vector<double>{1.25});
 }
 
 TEST_F(Csv, LinesAcrossTheBufferAreWhole) {
-  // 20000 rows of about 30 bytes: about ten times the buffer size.
+  // The table has 20000 rows of about 30 bytes, about ten times the size of the buffer.
   std::string text = "t_s,z\n";
   for (int i = 0; i < 20000; ++i) {
     text += std::to_string(i) + "," + std::to_string(i) + ".000000000000000000\n";
@@ -239,18 +241,18 @@ TEST_F(Csv, BlindAfterDropsTheFirstStreamInTheRestOfTheSeries) {
     int count = 0;
     bool ended = false;
     const auto source = Open(kDepthConfig + ("blind_after: " + share + "\n"));
-    // 1 drops nothing, so the rows need not be counted
+    // A fraction of 1 drops nothing, so the rows need not be counted.
     EXPECT_EQ(source->size(), share == "1" ? -1 : 7);
     for (SourceFrame frame; source->Next(frame);) {
       const std::string held = Held(frame);
       EXPECT_TRUE(held == "0 1 | 0" || held == "1 | 0") << held;
       ended |= held == "1 | 0";
-      EXPECT_EQ(held == "1 | 0", ended);  // once blind, always blind
+      EXPECT_EQ(held == "1 | 0", ended);  // after the first blind row all rows are blind
       count += ended ? 0 : 1;
     }
     return count;
   };
-  // Rows k = 0 .. 6 are not blind while k < 7 F.
+  // Row k = 0 .. 6 is not blind if k < 7 F, with the fraction F.
   EXPECT_EQ(seen("0"), 0);
   EXPECT_EQ(seen("0.1"), 1);
   EXPECT_EQ(seen("0.5"), 4);
@@ -258,7 +260,7 @@ TEST_F(Csv, BlindAfterDropsTheFirstStreamInTheRestOfTheSeries) {
 }
 
 TEST_F(Csv, BlindAfterIsExactWhereTheShareIs) {
-  // In double precision 0.07 * 100 is 7.000000000000001.
+  // The test is of rounding: in double precision 0.07 * 100 is 7.000000000000001.
   std::string text = "t_s,z\n";
   for (int i = 0; i < 100; ++i) text += std::to_string(i) + ",1\n";
   Write(text);

@@ -19,7 +19,8 @@ constexpr double kBfPxM = 400.0 * 0.065;
 
 using Values = std::map<std::string, double>;
 
-/// Provides a source with parameters: `values`, else the defaults. Choices are indices.
+/// Host that provides a source with parameters: those in `values`, and defaults for the others. The
+/// value of a choice is its index.
 class Host {
  public:
   explicit Host(Values values = {}) : values_(std::move(values)) {
@@ -79,7 +80,7 @@ std::vector<double> Series(const Values& values, Stream stream, std::uint64_t se
   return series;
 }
 
-/// Noise samples, recovered with the formulas of the source; all are N(0, 1).
+/// Noise samples, recovered with the formulas of the source. All samples are N(0, 1).
 struct Noise {
   std::vector<double> disparity, scale;
 };
@@ -88,7 +89,7 @@ Noise NoiseOf(const std::vector<SourceFrame>& frames, double sigma_d, double sig
   Noise noise;
   for (const SourceFrame& frame : frames) {
     const double depth_m = frame.truth[0][0];
-    const double scale = 0.3 / depth_m;  // of the target, for Z0 = 0.3 m and w = 300 px
+    const double scale = 0.3 / depth_m;  // Z0 / Z; Z0 = 0.3 m, w = 300 px
     noise.disparity.push_back((*Value(frame, kDisparityAll) - kBfPxM / depth_m) / sigma_d);
     noise.scale.push_back((1.0 / *Value(frame, kInverseScale) - scale) * scale * 300.0 /
                           (2.0 * sigma_e));
@@ -109,7 +110,7 @@ double MeanProduct(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 TEST(DepthTarget, DefaultsAreTheScenarioOf2017) {
-  // t = 0, 33 ms, ... <= 5 s: 151 * 33 ms = 4.983 s.
+  // The times are t = 0, 33 ms, ... <= 5 s. The last one is 151 * 33 ms = 4.983 s.
   const std::vector<SourceFrame> frames = AllFrames({});
   ASSERT_EQ(frames.size(), 152u);
   EXPECT_EQ(Host().Make()->size(), 152);
@@ -136,14 +137,15 @@ TEST(DepthTarget, NamesItsStreamsAndTruths) {
 }
 
 TEST(DepthTarget, LastSampleSurvivesRounding) {
-  // In double precision 0.3 / 0.1 is 2.9999999999999996; t = 0, 0.1, 0.2, 0.3 s.
+  // In double precision 0.3 / 0.1 is 2.9999999999999996. The times are still 0, 0.1, 0.2 and 0.3 s.
   EXPECT_EQ(AllFrames({{"duration_s", 0.3}, {"rate_hz", 10.0}}).size(), 4u);
   EXPECT_EQ(AllFrames({{"duration_s", 0.299999}, {"rate_hz", 10.0}}).size(), 3u);
   EXPECT_EQ(AllFrames({{"duration_s", 0.0}}).size(), 1u);
 }
 
 TEST(DepthTarget, WithoutNoiseGivesTheFormulas) {
-  // Quarter periods of 0.5 Hz: Z = 0.3, 0.4, 0.3, 0.2 m. d = 26 px m / Z; 1/scale = Z / 0.3 m.
+  // The samples are at quarter periods of 0.5 Hz: Z = 0.3, 0.4, 0.3, 0.2 m. d = 26 px m / Z;
+  // 1/scale = Z / 0.3 m.
   const std::vector<SourceFrame> frames = AllFrames({{"frequency_hz", 0.5},
                                                      {"rate_hz", 2.0},
                                                      {"duration_s", 1.5},
@@ -153,7 +155,7 @@ TEST(DepthTarget, WithoutNoiseGivesTheFormulas) {
   const double inverse_scale[] = {1.0, 4.0 / 3.0, 1.0, 2.0 / 3.0};
   ASSERT_EQ(frames.size(), 4u);
   for (std::size_t k = 0; k < 4; ++k) {
-    const bool sees = k < 3;  // the limit is 0.3 m, and 0.3 m is not below it
+    const bool sees = k < 3;  // 0.3 m is not below the limit of 0.3 m
     EXPECT_NEAR(*Value(frames[k], kDisparityAll), disparity_px[k], 1e-12);
     EXPECT_NEAR(*Value(frames[k], kInverseScale), inverse_scale[k], 1e-15);
     EXPECT_EQ(Value(frames[k], kDisparity).has_value(), sees);
@@ -163,8 +165,8 @@ TEST(DepthTarget, WithoutNoiseGivesTheFormulas) {
 }
 
 TEST(DepthTarget, TemplateDepthScalesTheImage) {
-  // Z = 0.3 m and a template recorded at 0.6 m: the target looks twice as large; the truth is 1 /
-  // 0.6 m.
+  // The target is at Z = 0.3 m and the template was recorded at 0.6 m. The target looks twice as
+  // large. The true inverse distance is 1 / 0.6 m.
   const std::vector<SourceFrame> frames =
       AllFrames({{"template_depth_m", 0.6}, {"duration_s", 0.0}, {"sigma_edge_px", 0.0}});
   EXPECT_NEAR(*Value(frames[0], kInverseScale), 0.5, 1e-15);
@@ -199,8 +201,9 @@ TEST(DepthTarget, NearOnTrueComparesTheExactDisparity) {
 }
 
 TEST(DepthTarget, ThresholdOnTheNoisyDisparitySelects) {
-  // At rest at the limit, only the lower half of N(0, 1) passes: its mean is -sqrt(2/pi) and its
-  // variance 1 - 2/pi. All samples pass if the test uses the exact disparity. 5 sigma.
+  // The target is at rest at the limit. Only the lower half of N(0, 1) passes, with the mean
+  // -sqrt(2/pi) and the variance 1 - 2/pi. All samples pass if the exact disparity is compared with
+  // the limit. Tolerances are 5 sigma.
   Values values{{"frequency_hz", 0.0}, {"rate_hz", 1000.0}, {"duration_s", 20.0}};
   const std::vector<double> measured = Series(values, kDisparity);
   values["blind_test"] = 1;
@@ -218,8 +221,8 @@ TEST(DepthTarget, NearZeroIsNeverBlind) {
 }
 
 TEST(DepthTarget, NoiseIsAsItsFormulasSay) {
-  // Both recovered noises are N(0, 1) at every depth: mean 0, variance 1 in either half of the
-  // depths, no correlation. 5 sigma of N samples.
+  // Both recovered noises are N(0, 1) at every depth. In either half of the depths they have mean 0
+  // and variance 1, and are not correlated. Tolerances are 5 sigma of n samples.
   const std::vector<SourceFrame> frames = AllFrames({{"rate_hz", 10000.0},
                                                      {"duration_s", 5.0},
                                                      {"sigma_disparity_px", 0.5},
@@ -272,7 +275,8 @@ TEST(DepthTarget, PoorTextureLosesDisparitiesOrMakesThemAnything) {
     values[key] = value;
     return AllFrames(values);
   };
-  // Stream 1, disparity_all: 52 px with a noise of 1 px; the maximum is 52 px.
+  // Stream 1, disparity_all, is 52 px with a noise of 1 px. The largest disparity of the search is
+  // 52 px.
   const auto disparities = [](const std::vector<SourceFrame>& frames) {
     std::vector<double> found;
     for (const SourceFrame& frame : frames) {

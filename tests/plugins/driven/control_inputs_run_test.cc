@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Control inputs from a config: tests/plugins/driven/config.yaml with all estimators on one table.
+// Tests of control inputs from a config. All estimators run tests/plugins/driven/config.yaml on one
+// table.
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -23,11 +24,12 @@ struct Gaussian {
   double x, p;
 };
 
-/// Returns the Kalman filter or the smoother of drive.csv, calculated here. Each speed acts until
-/// the next one; that of 2.5 s acts until 4 s, as its timeout is 1.5 s; there is none before 0.5 s.
+/// Returns the estimates of the Kalman filter or of the smoother for drive.csv, calculated here.
+/// There is no speed before 0.5 s. Each speed acts until the next one. Only the speed of 2.5 s ends
+/// earlier, at 4 s, because its timeout is 1.5 s.
 std::vector<Gaussian> WrittenOut(bool smoothed) {
   struct Row {
-    double t_s, distance, fix;  // distance since the previous row, m; fix 0: none
+    double t_s, distance, fix;  // m: distance since the previous row; fix, 0: none
   };
   const std::vector<Row> rows = {
       {0.0, 0.0, 1.2},       {0.5, 0.0, 0.0},        {1.0, 2.0 * 0.5, 2.3}, {1.7, 1.5 * 0.7, 0.0},
@@ -68,7 +70,7 @@ class DrivenTest : public HostTest {
     recorder.Finish(result);
     return result;
   }
-  /// Returns the first line of the error of the config with `key` set to `value`.
+  /// Sets `key` of the config to `value`, and returns the first line of the resulting error.
   std::string Refusal(const std::string& key, const std::string& value) {
     std::string text;
     const Config config = Read({{key, value}});
@@ -100,7 +102,7 @@ TEST_F(DrivenTest, EveryEstimatorIsDrivenAsTheKalmanFilterWrittenOut) {
         EXPECT_NEAR(std::stod(cells[1]), expected[k].x, 1e-9) << one.name << k;
         EXPECT_NEAR(std::stod(cells[2]), std::sqrt(expected[k].p), 1e-9) << one.name << k;
       }
-      // An input has no innovation, but it is counted.
+      // A control input has no innovation, but it is counted.
       EXPECT_EQ(testing::Lines(folder / one.name / "innovations.csv").size(), 8u) << one.name;
       EXPECT_EQ(one.counts.at("inputs:car"), 6) << one.name;
       EXPECT_EQ(one.counts.at("accepted:gps"), 7) << one.name;
@@ -118,7 +120,7 @@ TEST_F(DrivenTest, EveryEstimatorIsDrivenAsTheKalmanFilterWrittenOut) {
   }
 }
 
-// The odometry belongs to no sensor, so a filter neither accepts nor rejects it.
+// No sensor measures the odometry, so a filter neither accepts nor rejects it.
 TEST_F(DrivenTest, WhatAFilterAcceptedComesWithAllInputs) {
   const RunResult run =
       RunInto(Read({{"estimators",

@@ -5,7 +5,7 @@
 
 namespace {
 
-/// z = x + n, n ~ N(0, sigma^2)
+/// Sensor z = x + n, n ~ N(0, sigma^2).
 struct Fix : alidade::Sensor<alidade::Vec<1>, alidade::Vec<1>> {
   static constexpr std::array kRoles{alidade::Quantity{"position", "m"}};
   static constexpr alidade::Quantity kMeasurement{"fix", "m"};

@@ -13,22 +13,22 @@
 #include "support/manifold_models.h"
 #include "support/systems.h"
 
-/// Tests a shipped model, defined by one struct: as a plugin in the engine and in the batch, and
-/// composed at compile time. Each composition takes seconds to compile, so several sources share
-/// the rows.
+/// Tests of a shipped model, which one struct defines. The model runs as a plugin in the engine and
+/// in the batch, and composed at compile time. A composition takes seconds to compile, so the rows
+/// are divided among several sources.
 namespace alidade::testing {
 
-/// Motion model of the blocks that a sensor uses.
+/// Motion model of a block that the tested sensor uses.
 template <class G>
 using Wander = ManifoldWalk<G, 0.01>;
-/// Sensor of the blocks of a motion model.
+/// Sensor of a block of the tested motion model.
 template <class G>
 using Seen = ManifoldSensor<G, 0.05>;
 
 using Means = std::vector<std::vector<double>>;
 
-/// Adds the state entry `name` with blocks at `means` and a sigma of 0.05 for each element. Its
-/// control input has the stream `NAME.input`.
+/// Adds the state entry `name`. The priors of its blocks have the means `means`, and a sigma of
+/// 0.05 for each element. The stream of its control input is `NAME.input`.
 inline void AddMotion(Problem& problem, const std::string& name, const SharedMotion& model,
                       const Means& means) {
   MotionBinding binding{name, model, {}};
@@ -74,8 +74,8 @@ inline std::vector<double> InputOf(int size) {
   return u;
 }
 
-/// Returns frames in which every sensor measures the means of the priors with about its own noise.
-/// The frames also contain the control inputs.
+/// Returns frames in which every sensor measures the means of the priors. The errors are about as
+/// large as the noise of the sensor. The frames also contain the control inputs.
 inline std::vector<Frame> FramesOf(const Problem& problem, int count) {
   std::vector<Frame> frames(static_cast<std::size_t>(count));
   for (int k = 0; k < count; ++k) {
@@ -113,8 +113,9 @@ inline std::vector<Frame> FramesOf(const Problem& problem, int count) {
   return frames;
 }
 
-/// Expects equal results of the engine and of `filter` for the same frames. Each block has its own
-/// sensor, followed by the sensor `last`; `inputs` are the control inputs of `filter`.
+/// Expects equal results of the engine and of `filter` for the same frames. The sensors of the
+/// single blocks are used first, then the sensor `last`. `inputs` are the control inputs of
+/// `filter`.
 template <class Filter, class Last, class... Inputs>
 void ExpectSame(const Problem& problem, Filter filter, const Last& last, Inputs... inputs) {
   EkfOptions options;
@@ -153,10 +154,10 @@ void ExpectSame(const Problem& problem, Filter filter, const Last& last, Inputs.
   }
 }
 
-/// A model, its parameters, and the data that the tests below need.
+/// Model, with its parameters and the data that the tests need.
 struct Row {
   std::string model, parameters;
-  /// Creates a problem with the plugin's model.
+  /// Creates a problem with the model of the plugin.
   std::function<Problem(const PluginHost&, const Node&)> problem;
   std::function<void(const Problem&)> expect_static_is_engine;
   double nonlinearity;  ///< allowed final difference between batch and filter, in sigmas
@@ -228,7 +229,8 @@ Row SensorRow(const std::string& name, const std::string& parameters, const Mode
   return {name, parameters, problem, expect, 0.05};
 }
 
-/// A camera with large pixels: for a landmark 2 m ahead, an uncertainty of 0.05 is about a pixel.
+/// Camera with large pixels. For a landmark 2 m ahead, an uncertainty of 0.05 corresponds to about
+/// a pixel.
 inline const std::string kSmallCameraKeys = "width: 32, height: 24, fx: 20, fy: 20, cx: 16, cy: 12";
 inline const std::string kSmallCameraText = "camera: {" + kSmallCameraKeys + '}';
 inline const Camera kSmallCamera(32, 24, 20, 20, 16, 12);
@@ -245,7 +247,8 @@ inline const PluginHost& Shipped() {
   return host;
 }
 
-/// The tests are in every_model_test.cc, the rows in every_model_*_test.cc.
+/// Test of one row. The tests are in every_model_test.cc, the rows in the other *_test.cc of this
+/// folder.
 class EveryModel : public ::testing::TestWithParam<Row> {
  protected:
   const Row& row_ = GetParam();
@@ -254,8 +257,8 @@ class EveryModel : public ::testing::TestWithParam<Row> {
   Problem system_;
 };
 
-/// Returns the name of a row: the model and the index of the row in its source,
-/// `stereo_disparity_0`.
+/// Returns the name of a row, such as `stereo_disparity_0`: the model, and the index of the row in
+/// its source.
 inline std::string RowName(const ::testing::TestParamInfo<Row>& row) {
   return row.param.model + '_' + std::to_string(row.index);
 }

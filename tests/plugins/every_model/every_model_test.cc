@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests every shipped model: as a plugin in the engine and in the batch, composed at compile time,
-// and with the checker. A model without a row fails.
+// Tests of every shipped model: as a plugin in the engine and in the batch, composed at compile
+// time, and with the checker. A shipped model without a row is an error.
 #include "alidade/check/check.h"
 #include "alidade/experiment/estimator_plugin.h"
 #include "every_model_fixture.h"
@@ -13,8 +13,8 @@ TEST_P(EveryModel, IsTheSameAsAPluginAndComposedAtCompileTime) {
   row_.expect_static_is_engine(system_);
 }
 
-// For linear models the last estimate of the batch equals the filter's; the motion models here are
-// linear. Without the measurements of the sensor a batch would be off by 0.1 to 0.6 sigma.
+// If all models are linear, the last estimate of the batch equals that of the filter. Without the
+// measurements of the sensor the batch would be off by 0.1 to 0.6 sigma.
 TEST_P(EveryModel, GivesTheBatchItsFactors) {
   const auto& entries = Shipped().entries();
   if (std::none_of(entries.begin(), entries.end(),
@@ -58,7 +58,8 @@ TEST_P(EveryModel, PassesTheChecker) {
   }
 }
 
-// The rows are read from the test names, such as `Scalars/EveryModel.PassesTheChecker/constant_0`.
+// The names of the tests contain the rows, such as
+// `Scalars/EveryModel.PassesTheChecker/constant_0`.
 TEST(Models, HaveARow) {
   std::set<std::string> rows, shipped;
   const ::testing::UnitTest& all = *::testing::UnitTest::GetInstance();
@@ -80,7 +81,7 @@ TEST(Models, HaveARow) {
     if (entry.is_model() && fs::equivalent(entry.plugin.parent_path(), ShippedFolder()))
       shipped.insert(entry.name);
   }
-  EXPECT_EQ(rows, shipped) << "a row in tests/plugins/every_model for each model that is shipped";
+  EXPECT_EQ(rows, shipped) << "each shipped model needs a row in tests/plugins/every_model";
 }
 
 }  // namespace alidade::testing

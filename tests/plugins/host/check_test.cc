@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Every model of tests/faults/plugins/bad_models.cc has one fault. The corresponding check must
-// report it, and no other check may fail.
+// report the fault, and no other check may fail.
 #include "alidade/check/check.h"
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 
 using Verdict = Finding::Verdict;
 
-/// Returns `check: text` of every failure.
+/// Returns `CHECK: TEXT` of every failure.
 std::vector<std::string> Failures(const std::vector<Finding>& findings) {
   std::vector<std::string> failures;
   for (const Finding& finding : findings) {
@@ -42,7 +42,7 @@ class CheckTest : public HostTest {
 };
 
 struct Fault {
-  int number;  ///< in the table of faults; 0: none
+  int number;  ///< number in tests/faults/README.md; 0: none
   const char* model;
   const char* check;
   std::vector<const char*> words;
@@ -55,10 +55,10 @@ std::string Name(const ::testing::TestParamInfo<Fault>& info) {
 class OneFault : public CheckTest, public ::testing::WithParamInterface<Fault> {};
 
 TEST_P(OneFault, IsFoundByItsCheckAlone) {
-  // A sanitizer ends such a process itself, and its stack differs.
+  // A sanitizer itself ends such a process, and has a different stack.
   const std::string model = GetParam().model;
   const bool differs = model == "exits" || model == "eats_memory" || model == "unwritten";
-  if (testing::kSanitized && differs) GTEST_SKIP() << "a sanitizer ends it in its own way";
+  if (testing::kSanitized && differs) GTEST_SKIP() << "a sanitizer ends the process differently";
   CheckOptions options;
   if (model.starts_with("hangs") || model == "stops_itself") options.timeout_s = 1.0;
   options.memory_mb = 64;
@@ -261,14 +261,14 @@ TEST_F(CheckTest, FindsPluginsByFileStemAndModel) {
   EXPECT_EQ(FindModels(host_, "gravity").size(), 1u);
   ExpectError(ExitCode::kPlugin, {"no plugin 'scale_2' with", "did you mean 'scale_2d'?"},
               [&] { FindModels(host_, "scale_2"); });
-  // The name is close to a source, which has no model to check.
+  // The name is similar to that of a source, which is not a model.
   ExpectError(ExitCode::kPlugin, {"no plugin 'depth_targe' with a sensor or motion model\n"},
               [&] { FindModels(host_, "depth_targe"); });
   ExpectError(ExitCode::kPlugin, {"offers no model 'righ'", "did you mean 'right'?"},
               [&] { FindModels(host_, "bad_models", "righ"); });
 }
 
-/// Adds landmark sensors with every representation and every lens.
+/// Adds parameters of landmark sensors with every representation and every lens.
 void AddLandmarkSensors(std::multimap<std::string, std::string>& parameters) {
   const std::string camera = "camera: {width: 640, height: 480, fx: 525, fy: 520, cx: 320, cy: 240";
   const std::pair<std::string, std::string> sensors[] = {
@@ -290,8 +290,8 @@ void AddLandmarkSensors(std::multimap<std::string, std::string>& parameters) {
   }
 }
 
-// With these seeds, differences over long steps agree on the mean slope, although the camera
-// rotates many times at 1e6 rad/s.
+// At 1e6 rad/s the camera rotates many times in a step. With these seeds, numeric differences over
+// long steps agree on a mean slope.
 TEST_F(CheckTest, AMotionThatTurnsManyTimesInAStepPasses) {
   const PluginEntry odometry = FindModels(host_, "odometry_pose").at(0);
   const Config config = Parse("{noise: {linear_velocity: 0.3, angular_velocity: 0.002}}");
@@ -302,7 +302,7 @@ TEST_F(CheckTest, AMotionThatTurnsManyTimesInAStepPasses) {
   }
 }
 
-/// Every shipped model passes with the parameters of its row.
+/// Every shipped model passes the check with each row of its parameters.
 TEST_F(CheckTest, ShippedModelsPass) {
   std::multimap<std::string, std::string> parameters = {
       {"constant", "{}"},

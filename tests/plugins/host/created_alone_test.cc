@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Several threads create models of one host.
+// Test in which several threads create models of one host.
 #include <thread>
 
 #include "host_fixture.h"
@@ -10,7 +10,7 @@ namespace {
 
 class CreatedAloneTest : public HostTest {};
 
-// ALIDADE_THREAD_INSTANCES concerns instances that exist already.
+// ALIDADE_THREAD_INSTANCES applies to existing instances, not to their creation.
 TEST_F(CreatedAloneTest, IsEachModelWhateverTheThread) {
   const PluginHost host({Built("created_alone")});
   std::string errors[2];

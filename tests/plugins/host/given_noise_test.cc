@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Noise given as a covariance: `covariance` of a sensor, `noise.covariance` of a state entry.
+// Tests of noise given as a covariance: `covariance` of a sensor, and `noise.covariance` of a state
+// entry.
 #include <cmath>
 
 #include "alidade/experiment/read_problem.h"
@@ -58,14 +59,14 @@ Problem PixelsWith(const std::string& keys) {
   return ReadProblem(config.root(), ShippedModels(), {});
 }
 
-// [1 0.6; 0.6 4] = L L', L = [1 0; 0.6 sqrt(4 - 0.36)], px
+// The root of [1 0.6; 0.6 4] = L L' is L = [1 0; 0.6 sqrt(4 - 0.36)], px.
 TEST_F(GivenNoise, IsThatOfEveryModelOfTheSensor) {
   const Values expected = {1.0, 0.0, 0.6, std::sqrt(4.0 - 0.6 * 0.6)};
   const Problem problem = PixelsWith("covariance: [[1, 0.6], [0.6, 4]]");
   EXPECT_EQ(RootOfR(problem.sensors[0].model), expected);
   ASSERT_TRUE(problem.sensors[0].xyz != nullptr);
   EXPECT_EQ(RootOfR(problem.sensors[0].xyz), expected);
-  // The same with a time offset, which adds roles to the sensor.
+  // The root is the same with a time offset, which adds roles to the sensor.
   const Problem late =
       PixelsWith("covariance: [[1, 0.6], [0.6, 4]]\n    time_offset_s: {mean: 0, sigma: 0.01}");
   EXPECT_GT(late.sensors[0].roles.size(), problem.sensors[0].roles.size());
@@ -90,8 +91,8 @@ TEST_F(GivenNoise, IsRefusedWhereItIsNoCovarianceOfTheMeasurement) {
 }
 
 TEST_F(GivenNoise, TakesNothingButTheNoiseFromAModel) {
-  // The kind of noise is still read. template_px, which is not a sigma, is required although R does
-  // not use it.
+  // The kind of noise is still read. template_px is not a sigma, so it is still required, although
+  // R does not use it.
   const auto scale = [](const std::string& keys) {
     const Config config = Parse("{covariance: [[0.25]], " + keys + "}");
     const SharedSensor model = ShippedModels().CreateSensor("scale_2d", config.root());
@@ -114,13 +115,13 @@ TEST_F(GivenNoise, OfAMotionModelIsThatOfItsInputs) {
   const Config config =
       Parse("{dimensions: 2, noise: {kind: discrete, covariance: [[4, -1], [-1, 1]]}}");
   const SharedMotion model = Motion(config, "constant_velocity");
-  // m/s^2, held: the root does not depend on dt
+  // The noise is a held acceleration, m/s^2. Its root therefore does not depend on dt.
   for (const double dt_s : {0.1, 3.0}) {
     EXPECT_EQ(RootOfQ(model, dt_s), (Values{2.0, 0.0, -0.5, std::sqrt(0.75)}));
   }
 }
 
-// A body that moves in a plane: 3 of its 6 inputs have no noise, and two depend on the same noise.
+// The body moves in a plane. 3 of its 6 inputs have no noise, and two others have a common noise.
 TEST_F(GivenNoise, OfAMotionModelMayBeSingular) {
   const Config config = Parse(
       "noise:\n"

@@ -14,7 +14,7 @@
 
 namespace alidade {
 
-/// Test with its own folder and without the user's plugins.
+/// Test in a temporary folder, without the plugins of the user.
 class HostTest : public ::testing::Test {
  protected:
   HostTest() {
@@ -23,7 +23,7 @@ class HostTest : public ::testing::Test {
   }
   ~HostTest() override { unsetenv("ALIDADE_PLUGIN_PATH"); }
 
-  /// Returns the path of a plugin from the build.
+  /// Returns the path of a test plugin of this build.
   static std::filesystem::path Built(const std::string& name) {
     return std::filesystem::path(ALIDADE_TEST_PLUGINS) / (name + ".so");
   }
@@ -48,7 +48,7 @@ class HostTest : public ::testing::Test {
       }
     }
   }
-  /// Expects an error if `file` alone is loaded.
+  /// Expects an error if only `file` is loaded.
   static void ExpectRefused(const std::filesystem::path& file, std::vector<std::string> words,
                             ExitCode code = ExitCode::kPlugin) {
     words.push_back(file.string());

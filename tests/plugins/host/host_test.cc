@@ -60,7 +60,7 @@ TEST_F(HostTest, RunsASensorOfOneFileBuiltByABareCommandLine) {
 }
 
 TEST_F(HostTest, StructsOfOneNameInTwoPluginsStayApart) {
-  // Both plugins define `struct Probe` with default visibility and are open at the same time.
+  // Both plugins define `struct Probe` with default visibility. Both are open at the same time.
   const PluginHost two({Built("twin_two")}), three({Built("twin_three")});
   const Config config = Parse("model: probe");
   EXPECT_EQ(Predicted(two.CreateSensor("probe", config.root()), 1.0), 2.0);
@@ -92,12 +92,13 @@ TEST_F(HostTest, LeavesPluginsClosedOfWhichNoNameIsAskedFor) {
   };
   const PluginHost host({}, OnRefusal::kThrow, only);
   EXPECT_TRUE(offers(host, "probe"));
-  EXPECT_TRUE(offers(host, "later_sensor"));  // this plugin lists no names
+  EXPECT_TRUE(offers(host, "later_sensor"));  // this plugin does not list its names
   EXPECT_FALSE(offers(host, "range_rate"));
   EXPECT_FALSE(offers(host, "constant"));
   EXPECT_TRUE(offers(host.WithAllPlugins(), "range_rate"));
   EXPECT_TRUE(offers(host.WithAllPlugins(), "constant"));
-  // Explicitly given plugins are opened completely. An error considers the models of all plugins.
+  // Explicitly given plugins are opened even if no name in them is requested. An error message
+  // considers the models of all plugins.
   EXPECT_TRUE(offers(PluginHost({folder_ / "path"}, OnRefusal::kThrow, only), "range_rate"));
   const Config config = Parse("model: rate");
   ExpectError(ExitCode::kPlugin, {"no plugin offers the sensor 'range_rat'", "'range_rate'?"},
@@ -164,7 +165,7 @@ TEST_F(HostTest, AFileThatIsNotAPluginIsRefused) {
   }
   const fs::path folder = folder_ / "folder.so";
   fs::create_directory(folder);
-  EXPECT_NO_THROW(PluginHost({folder})) << "a folder is searched, whatever its name";
+  EXPECT_NO_THROW(PluginHost({folder})) << "a folder with any name is searched";
 }
 
 TEST_F(HostTest, ATruncatedPluginIsRefused) {
@@ -356,7 +357,7 @@ TEST_F(HostTest, AParameterDeclaredAgainstTheRulesIsRefused) {
                            "default_beyond", "later_flag", "reserved_member", "empty_range",
                            "many_choices", "half", "huge", "outside", "text_as_number"}) {
     const Config config = Parse(std::string("{model: ") + name + '}');
-    // The same declaration reads a parameter that the config contains.
+    // The declaration is also invalid if the config contains the parameter.
     const Config given = Parse(std::string("{model: ") + name + ", noise: [fixed, free]}");
     for (const Config* one : {&config, &given}) {
       ExpectError(ExitCode::kPlugin,

@@ -6,15 +6,16 @@
 
 #include "alidade/model/plugin.h"
 
-/// One source for every compiler and set of flags of the build matrix. It uses transcendental
-/// functions, quaternions, fixed and heap-allocated Eigen matrices, and the standard library.
+/// Source that is built with every compiler and set of flags of the build matrix. It uses
+/// transcendental functions, quaternions, fixed and heap-allocated Eigen matrices, and the standard
+/// library.
 namespace {
 
 using alidade::Quantity;
 using alidade::UnitQuaternion;
 using alidade::Vec;
 
-/// z = (e^-b sin(y_x) + y_y, |y|), y = R(q)' p
+/// Sensor z = (e^-b sin(y_x) + y_y, |y|), y = R(q)' p.
 struct MatrixSensor : alidade::Sensor<Vec<2>, UnitQuaternion, Vec<3>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"orientation"}, Quantity{"point", "m", "", "x,y,z"},
                                      Quantity{"bias"}};
@@ -48,7 +49,7 @@ struct MatrixSensor : alidade::Sensor<Vec<2>, UnitQuaternion, Vec<3>, Vec<1>> {
   }
 };
 
-/// q' = q Exp(omega dt), omega' = omega e^(-dt / tau) + w
+/// Motion q' = q Exp(omega dt), omega' = omega e^(-dt / tau) + w.
 struct MatrixMotion : alidade::Motion<3, UnitQuaternion, Vec<3>> {
   static constexpr std::array kBlocks{Quantity{"orientation"},
                                       Quantity{"rate", "rad/s", "", "x,y,z"}};

@@ -8,7 +8,8 @@
 namespace alidade {
 namespace {
 
-// -march=x86-64-v3 rounds a b + c once; libm is the same: a few ulp for each operation.
+// With -march=x86-64-v3, a b + c is rounded only once. libm is the same. Results differ by a few
+// ulp for each operation.
 constexpr double kRelative = 1e-12;
 constexpr int kPoints = 100;
 
@@ -48,7 +49,7 @@ void EvaluateMotion(const SharedMotion& motion, const std::vector<double>& x,
   out.insert(out.end(), l, l + 9);
 }
 
-/// Returns all results of both models at fixed random points.
+/// Returns all results of both models at random points, which are the same in every call.
 std::vector<double> Evaluate(const std::filesystem::path& plugin) {
   const PluginHost host({plugin});
   const Config config = Config::FromText("{gain: 1.7, tau_s: 0.6}", "matrix");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Parameters that sensors and the source share: the maps `camera` and `landmarks` at the root.
+// Tests of parameters that sensors and the source share: the maps `camera` and `landmarks` at the
+// root.
 #include "alidade/experiment/source_plugin.h"
 #include "alidade/testing/jacobians.h"
 #include "host_fixture.h"
@@ -27,7 +28,7 @@ SharedSensor Pixels(const Config& config, const char* name = "pixels") {
   return model;
 }
 
-/// u of a point 2 m ahead and 1 m to the right: cx + fx / 2.
+/// Returns u of a point 2 m ahead and 1 m to the right: cx + fx / 2.
 double U(const SharedSensor& xyz) {
   const testing::Blocks roles{{0, 0, 0}, {1, 0, 0, 0}, {1, 0, 2}};
   double z[2];
@@ -64,20 +65,20 @@ TEST_F(SharedParametersTest, ErrorsNameTheMapThatIsWrong) {
     });
   };
   const std::string sensors = "sensors: {pixels: {sigma_px: 1}}\n";
-  // missing in both maps: the error names the map at the root, the usual one
+  // If a key is missing in both maps, the error names the map at the root, which is the usual one.
   refused({"test.yaml:2:1 camera.fy: missing; model 'inverse_depth_feature' needs it (px, > 0"},
           sensors + "camera: {width: 640, height: 480, fx: 500, cx: 320, cy: 240}");
   refused({"camera.width: missing; model 'inverse_depth_feature' needs it"}, sensors);
   refused({"test.yaml:2:45 camera.fx: '-5'", "> 0"},
           sensors + "camera: {width: 640, height: 480,       fx: -5, fy: 5, cx: 1, cy: 1}");
-  // unknown, or a key of another lens
+  // The key is unknown, or is one of another lens.
   refused({"test.yaml:2:81 camera.fz: unknown key", "did you mean 'fx'?"},
           sensors + kCamera.substr(0, kCamera.size() - 2) + ",           fz: 3}");
   refused({"camera.k1: unknown key"}, sensors + kCamera.substr(0, kCamera.size() - 2) + ", k1: 3}");
   refused({"landmarks.representation: 'xzy'", "one of inverse_depth, anchored, xyz",
            "did you mean 'xyz'?"},
           sensors + kCamera + "landmarks: {representation: xzy}");
-  // in the sensor entry
+  // The map in the sensor entry is checked, too.
   refused({"sensors.pixels.camera.fx: '-5'"},
           kCamera + "sensors: {pixels: {sigma_px: 1, camera: {fx: -5}}}");
   refused({"sensors.pixels.camera.fz: unknown key"},

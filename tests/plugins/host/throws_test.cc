@@ -64,14 +64,15 @@ TEST_F(ThrowsTest, InACallIsAFailureOfThatCall) {
   const SharedMotion q = Motion("throws_in_sqrt_q");
   EXPECT_EQ(q->SqrtQ(roles_, nullptr, 0.1, &out_), Status::kError);
   EXPECT_EQ(q->error_text(), Words("SqrtQ", "throws_in_sqrt_q"));
-  EXPECT_NE(eval->error_text(), Words("SqrtQ", "throws_in_sqrt_q")) << "which is another's";
+  EXPECT_NE(eval->error_text(), Words("SqrtQ", "throws_in_sqrt_q")) << "another model threw it";
 }
 
 TEST_F(ThrowsTest, WhatWasThrownIsOfTheLastFailureAlone) {
   const SharedSensor sensor = Sensor("throws_at_zero");
   EXPECT_EQ(sensor->Predict(roles_, &out_), Status::kError);
   EXPECT_EQ(sensor->error_text(), Words("Predict", "throws_at_zero"));
-  EXPECT_EQ(sensor->error_text(), Words("Predict", "throws_at_zero")) << "as often as it is asked";
+  EXPECT_EQ(sensor->error_text(), Words("Predict", "throws_at_zero"))
+      << "each call returns the same text";
   const double below = -1.0;
   const double* const roles[] = {&below};
   EXPECT_EQ(sensor->Predict(roles, &out_), Status::kError);

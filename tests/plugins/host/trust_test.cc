@@ -18,8 +18,8 @@ namespace fs = std::filesystem;
 constexpr uid_t kStranger = 54321;
 constexpr std::size_t npos = std::string::npos;
 
-/// A plugin that another user could have written is not opened.
-// Fault 70 of tests/faults/README.md.
+/// Test that a plugin that another user could have written is not opened.
+/// Fault 70 of tests/faults/README.md.
 class TrustTest : public HostTest {
  protected:
   static void Allow(const fs::path& path, fs::perms who) {
@@ -39,7 +39,7 @@ TEST_F(TrustTest, AFileThatOthersCanWrite) {
 
 TEST_F(TrustTest, AFileThatAGroupCanWrite) {
   if (geteuid() != 0) GTEST_SKIP() << "only root can give files to another group";
-  // this user has its own group, as users of Ubuntu do
+  // The user www-data has a private group, as users of Ubuntu do.
   const passwd* const user = getpwnam("www-data");
   if (user == nullptr) GTEST_SKIP() << "no such user";
   const uid_t id = user->pw_uid;
@@ -61,10 +61,11 @@ TEST_F(TrustTest, AFileThatAGroupCanWrite) {
     EXPECT_EQ(seteuid(0), 0);
     return error;
   };
-  EXPECT_EQ(trusted(own, own), "") << "`umask 002`";
+  EXPECT_EQ(trusted(own, own), "") << "a private group may write, as with `umask 002`";
   EXPECT_NE(trusted(own, kStranger).find("it is writable for its group; chmod go-w"), npos);
   EXPECT_NE(trusted(kStranger, own).find("' is writable for its group"), npos);
-  EXPECT_NE(trusted(own, 0).find("it is writable for its group"), npos) << "root's is not private";
+  EXPECT_NE(trusted(own, 0).find("it is writable for its group"), npos)
+      << "the group of root is not private";
 }
 
 TEST_F(TrustTest, AFolderThatOthersCanWrite) {
@@ -72,7 +73,8 @@ TEST_F(TrustTest, AFolderThatOthersCanWrite) {
   Allow(folder_ / "a", fs::perms::others_write);
   ExpectNotTrusted(file, "'" + (folder_ / "a").string() + "' is writable for everyone");
   Allow(folder_ / "a", fs::perms::sticky_bit);
-  EXPECT_NO_THROW(CheckTrusted(file)) << "like /tmp: others cannot replace what is in it";
+  EXPECT_NO_THROW(CheckTrusted(file))
+      << "as in /tmp, other users cannot replace files in this folder";
   Allow(folder_ / "a/b", fs::perms::others_write | fs::perms::sticky_bit);
   ExpectNotTrusted(file, "'" + (folder_ / "a/b").string() + "' is writable for everyone");
 }
@@ -141,7 +143,7 @@ TEST_F(TrustTest, InADefaultPlaceItIsToldWhenItsModelIsMissed) {
 TEST_F(TrustTest, ARelativePlaceOfTheEnvironmentIsNotSearched) {
   setenv("ALIDADE_PLUGIN_PATH", ".", 1);
   const fs::path before = fs::current_path();
-  std::ofstream(folder_ / "no_plugin.so") << "refused for its place before it is looked at";
+  std::ofstream(folder_ / "no_plugin.so") << "refused because of its place, before it is read";
   fs::current_path(folder_.path());
   const PluginHost host;
   fs::current_path(before);

@@ -2,8 +2,8 @@
 //
 // Runs every shipped model and every test model with `source: {type: models}`, in the problems of
 // tests/plugins/models/consistent. Each problem is linear, or linear to the accuracy that its
-// comment states. NEES and NIS of `ekf`, which has the true models, are chi-square. Each other
-// estimator has a wrong h, f or noise, and the test detects it.
+// comment states. The estimator `ekf` has the true models, so its NEES and NIS are chi-square. Each
+// other estimator has a wrong h, f or noise, and the test must detect this.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,7 +32,8 @@ constexpr int kRuns = testing::kSanitized ? 10 : 200, kFirstSeed = 1;
 constexpr const char* kProblems = ALIDADE_SOURCE_DIR "/tests/plugins/models/consistent";
 constexpr const char* kShippedPlugins = ALIDADE_BINARY_DIR "/lib/alidade/plugins";
 
-/// Returns the shipped plugins and those test plugins that are not deliberately faulty.
+/// Returns the host of the shipped plugins, and of the test plugins that are not deliberately
+/// faulty.
 const PluginHost& AllModels() {
   const auto places = [] {
     std::vector<fs::path> paths{kShippedPlugins};
@@ -46,7 +47,7 @@ const PluginHost& AllModels() {
   return host;
 }
 
-/// A sum of e' P^-1 e over independent e ~ N(0, P) with `dof` elements in total.
+/// Sum of e' P^-1 e over independent e ~ N(0, P). The e have `dof` elements in total.
 struct ChiSquare {
   double sum = 0.0, dof = 0.0;
 
@@ -54,7 +55,7 @@ struct ChiSquare {
     sum += square;
     dof += elements;
   }
-  /// Returns the interval that contains sum / dof with this probability.
+  /// Returns the interval that contains sum / dof with the given probability.
   Interval Bounds(double probability) const {
     const double tail = 0.5 * (1.0 - probability);
     return {ChiSquareQuantile(tail, dof) / dof, ChiSquareQuantile(1.0 - tail, dof) / dof};
@@ -69,9 +70,10 @@ void PrintTo(const ChiSquare& x, std::ostream* out) {
   *out << x.sum / x.dof << ", 99 % in [" << bounds.low << ", " << bounds.high << "]";
 }
 
-/// NEES and NIS of each estimator over many runs. Each sum has independent terms: the errors of the
-/// last frame of each run, of all blocks jointly and of a landmark; and all innovations of a
-/// sensor. Innovations are white over frames, and within a frame because each is a separate update.
+/// NEES and NIS of each estimator over many runs. The terms of each sum are independent. NEES has
+/// the errors at the last frame of each run: of all blocks jointly, and of a landmark. NIS has all
+/// innovations of a sensor. Innovations are white over frames. Within a frame they are white
+/// because each measurement is a separate update.
 class Tally : public RunObserver {
  public:
   using Sums = std::map<std::string, ChiSquare>;
@@ -96,7 +98,7 @@ class Tally : public RunObserver {
     if (frames_ < experiment_->source->size()) return;
     AddState(frame, state, sums["NEES"]);
     const std::vector<LandmarkEstimate> landmarks = named.estimator->landmarks();
-    // such a landmark is known exactly
+    // A landmark with zero covariance is known exactly.
     if (landmarks.empty() || landmarks[0].covariance.isZero()) return;
     AddLandmark(landmarks.front(), sums["NEES of the first landmark"]);
     AddLandmark(landmarks.back(), sums["NEES of the last landmark"]);
@@ -128,7 +130,7 @@ class Tally : public RunObserver {
   }
   static void Add(const Eigen::MatrixXd& p, const Eigen::VectorXd& error, ChiSquare& nees) {
     const double square = internal::SquaredMahalanobis(p, error);
-    ASSERT_GE(square, 0.0);  // P is regular
+    ASSERT_GE(square, 0.0);  // P must be regular
     nees.Add(square, static_cast<int>(error.size()));
   }
 
@@ -162,14 +164,14 @@ TEST_P(ModelsProblem, OnlyTheFilterOfTheModelsIsConsistent) {
     ASSERT_EQ(result.status, RunStatus::kOk) << result.reason;
   }
   ASSERT_TRUE(tally.sums().contains("ekf"));
-  EXPECT_GE(tally.sums().size(), 2u) << "an estimator with another model than the truth";
+  EXPECT_GE(tally.sums().size(), 2u) << "needs an estimator with a wrong model";
   for (const auto& [name, sums] : tally.sums()) {
     if (name == "ekf") {
       for (const auto& [what, sum] : sums) {
         EXPECT_TRUE(sum.IsWithin(0.99)) << what << ": " << ::testing::PrintToString(sum);
       }
-    } else if (!testing::kSanitized) {  // few runs do not suffice
-      // By chance this happens once in 1e9 runs of this test.
+    } else if (!testing::kSanitized) {  // a sanitizer build has too few runs
+      // A correct estimator is outside by chance once in 1e9 runs of this test.
       const auto far = [](const auto& one) { return !one.second.IsWithin(1.0 - 1e-9); };
       EXPECT_TRUE(std::ranges::any_of(sums, far)) << name << " is not seen";
     }
@@ -179,7 +181,7 @@ TEST_P(ModelsProblem, OnlyTheFilterOfTheModelsIsConsistent) {
 INSTANTIATE_TEST_SUITE_P(Models, ModelsProblem, ::testing::ValuesIn(Problems()),
                          [](const auto& problem) { return problem.param; });
 
-/// Returns the value at `dotted.key` below the map, if it exists.
+/// Returns the value of the dotted key `key` in the map, if it exists.
 std::optional<std::string> TextAt(const Node& map, const std::string& key) {
   const std::size_t dot = key.find('.');
   const auto child = map.Find(key.substr(0, dot));
@@ -188,12 +190,14 @@ std::optional<std::string> TextAt(const Node& map, const std::string& key) {
   return child->is_map() ? TextAt(*child, key.substr(dot + 1)) : std::nullopt;
 }
 
-/// Returns the name of a model with one of its choices: `scale_2d with noise_model: constant`.
+/// Returns the name of a model with one of its choices, such as `scale_2d with noise_model:
+/// constant`.
 std::string With(const PluginEntry& model, const ParamInfo& param, const std::string& choice) {
   return model.name + " with " + param.key + ": " + choice;
 }
 
-/// Returns the choices of a model, except for the lens of the camera, which all models share.
+/// Returns the parameters of a model that are choices. Omits those of the camera, which all models
+/// share.
 std::vector<ParamInfo> ChoicesOf(const PluginEntry& model) {
   std::vector<ParamInfo> choices = ModelSchema(model);
   std::erase_if(choices, [](const ParamInfo& param) {
@@ -202,7 +206,7 @@ std::vector<ParamInfo> ChoicesOf(const PluginEntry& model) {
   return choices;
 }
 
-/// Returns the models of a problem with the choices that it uses.
+/// Returns the models that a problem uses, and these models with the choices that it uses.
 std::set<std::string> UsedBy(const Config& config) {
   std::set<std::string> used;
   for (const char* kind : {"state", "sensors"}) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Full matrices R and Q from the config, in the simulator and in the filters. The filters equal a
-// Kalman filter calculated here, and NIS and NEES are 1.
+// Tests of full matrices R and Q from the config, in the simulator and in the filters. The filters
+// equal a Kalman filter calculated here, and the means of NIS and NEES are 1.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -18,7 +18,7 @@
 namespace alidade {
 namespace {
 
-/// A point in a plane with correlated errors of its acceleration and of its measured position.
+/// Config of a point with correlated errors of its acceleration and of its measured position.
 const std::string kProblem = R"(alidade: 1
 state:
   body:
@@ -61,8 +61,8 @@ const PluginHost& Models() {
   return host;
 }
 
-/// The Kalman filter of the problem. The attitude is known, so its measurement contains only noise,
-/// which is correlated with that of the position.
+/// Kalman filter of the problem. The attitude is known, so the measurement of the attitude contains
+/// only noise. This noise is correlated with that of the position.
 struct Kalman {
   Vector6 x{0, 0, 0, 1, 0, 0};
   Matrix6 p, r;
@@ -130,8 +130,8 @@ TEST(GivenNoiseRuns, EveryFilterIsTheKalmanFilter) {
   }
 }
 
-/// Returns the mean of a metric over seeds. `true_r` is the R of the simulated measurements; "":
-/// that of the filter.
+/// Returns the mean of a metric over seeds. `true_r` is the R of the simulated measurements. If it
+/// is empty, they have the R of the filter.
 double MeanOf(const std::string& metric, const std::string& true_r = "") {
   const int runs = testing::kSanitized ? 2 : 50;
   double sum = 0.0;
@@ -149,12 +149,12 @@ double MeanOf(const std::string& metric, const std::string& true_r = "") {
   return sum / runs;
 }
 
-// NIS per degree of freedom: 50 runs of 41 measurements with 6 elements give a sd of sqrt(2 /
-// 12300) = 0.013. NEES has at most 50 runs of 6 independent elements, 0.08, as it is correlated
-// over time within a run.
+// The mean of NIS has 50 runs of 41 measurements with 6 elements, so its sd is sqrt(2 / 12300) =
+// 0.013. NEES is correlated over time within a run. Its mean has at least 50 runs of 6 independent
+// elements, so its sd is at most 0.08.
 TEST(GivenNoiseRuns, TheSimulatorDrawsWhatTheFilterAssumes) {
   const double nis = MeanOf("nis.mean:poses"), nees = MeanOf("nees.mean:body");
-  // The same variances without the correlations that the filter assumes.
+  // The true R has the same variances, without the correlations that the filter assumes.
   const double other =
       MeanOf("nis.mean:poses",
              "[[0.25, 0, 0, 0, 0, 0], [0, 0.36, 0, 0, 0, 0], [0, 0, 0.04, 0, 0, 0], "

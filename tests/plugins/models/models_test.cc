@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The simulator of any config: truth and measurements have the distribution that a filter with the
-// same config assumes. Also tests the effect of each key.
+// Tests of source `models`. Truth and measurements have the distribution that a filter with the
+// same config assumes. Each key has its effect.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -19,7 +19,7 @@ namespace {
 
 using testing::Message;
 
-/// A target near 10 m; its disparity is so accurate that h is nearly linear.
+/// Config of a target near 10 m. The disparity is so accurate that h is nearly linear.
 const std::string kState =
     "alidade: 1\n"
     "state:\n"
@@ -52,7 +52,8 @@ std::string Refusal(const std::string& text) {
   return Message([&] { CreateSource(Shipped(), Parse(text), 1); });
 }
 
-/// Expects a mean of 1 over `runs` seeds for a metric of the first estimator, and no failed run.
+/// Expects that a metric of the first estimator has the mean 1 over `runs` seeds, and that no run
+/// fails.
 void ExpectOne(const std::string& metric, const Config& config, int runs, double tolerance) {
   if (testing::kSanitized) runs = 2;
   double sum = 0.0;
@@ -69,8 +70,8 @@ void ExpectOne(const std::string& metric, const Config& config, int runs, double
   }
 }
 
-// The mean NEES of a filter with the true models is 1. Each run has 2 degrees of freedom that are
-// correlated over about its length: the sd of the mean over 300 runs is at most 0.06.
+// The mean NEES of a filter with the true models is 1. Each run has 2 degrees of freedom, which are
+// correlated over about the whole run. The sd of the mean over 300 runs is therefore at most 0.06.
 TEST(Models, AFilterOfTheSameConfigIsConsistent) {
   for (const char* kind : {"continuous", "discrete"}) {
     for (const char* sensors :
@@ -85,7 +86,8 @@ TEST(Models, AFilterOfTheSameConfigIsConsistent) {
   }
 }
 
-// A camera among points: orientation, landmarks, their representation and the truth of the map.
+// A camera moves among points. Tests the orientation, the landmarks with their representation, and
+// the true map.
 TEST(Models, DrawsLandmarks) {
   const std::string text =
       "alidade: 1\n"
@@ -114,7 +116,7 @@ TEST(Models, DrawsLandmarks) {
     for (const Measurement& one : frame.measurements) {
       EXPECT_GE(one.landmark, 0);
       EXPECT_LT(one.landmark, 30);
-      EXPECT_TRUE(one.values[0] >= -0.5 && one.values[0] <= 639.5);  // in the image
+      EXPECT_TRUE(one.values[0] >= -0.5 && one.values[0] <= 639.5);  // u is in the image
     }
   }
   const auto source = CreateSource(Shipped(), config, 1);
@@ -141,14 +143,16 @@ TEST(Models, ANoiseIsThatOfItsOwnSeedAndSensor) {
     EXPECT_EQ(plain[i].truth, same[i].truth);
     EXPECT_EQ(plain[i].measurements[0].values, same[i].measurements[0].values);
     EXPECT_NE(plain[i].measurements[0].values, other[i].measurements[0].values);
-    // A lost measurement of one sensor changes neither the truth nor the noise of the other.
+    // A missing measurement of one sensor changes neither the truth nor the noise of the other
+    // sensor.
     ASSERT_EQ(lossy[i].measurements.size(), 1u);
     EXPECT_EQ(lossy[i].truth, plain[i].truth);
     EXPECT_EQ(lossy[i].measurements[0].values, plain[i].measurements[1].values);
   }
 }
 
-// The covariance of the initial states over many draws, with correlations and a singular prior.
+// Compares the covariance of the initial states over many draws with the prior. The prior has
+// correlations and is singular.
 TEST(Models, TheStartIsDrawnFromThePrior) {
   const std::string text =
       "alidade: 1\n"
@@ -186,7 +190,7 @@ TEST(Models, TheStartCanBeGiven) {
   EXPECT_NE(FramesOf(given)[0].truth[0], std::vector<double>{10});
 }
 
-// The priors apply at initial_time_s, the time of the first measurements.
+// The priors apply at initial_time_s. The first measurements have this time.
 TEST(Models, StartsAtTheTimeOfThePriors) {
   const auto frames =
       FramesOf(Parse(kState + "initial_time_s: 4\nsource: {type: models, rate_hz: 10}"));
@@ -207,7 +211,7 @@ TEST(Models, TheTruthCanHaveAModelOfItsOwn) {
 }
 
 TEST(Models, SensorsHaveRatesGapsAndOutliers) {
-  const std::string text =  // the target only recedes, so h is always defined
+  const std::string text =  // the target recedes, so h is always defined
       kState +
       "source: {type: models, rate_hz: 100, duration_s: 100, start: mean,\n"
       "  overrides: {state: {target: {noise: {acceleration: 0}}}}, ";
@@ -232,7 +236,7 @@ TEST(Models, SensorsHaveRatesGapsAndOutliers) {
   EXPECT_NEAR(farther, 317, 70);  // 0.1 P(|n| > 1)
 }
 
-// A control input acts on the truth until the next frame, as in the filter.
+// A control input acts on the true state until the next frame, as it does in the filter.
 TEST(Models, GivesControlInputs) {
   const std::string text =
       "alidade: 1\n"

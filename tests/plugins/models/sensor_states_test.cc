@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Sensors with their own states, known numbers or several parts: from a config, in the simulator
-// and in every estimator.
+// Tests of sensors with their own states, known numbers or several parts: from a config, in the
+// simulator and in every estimator.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -26,7 +26,8 @@ const PluginHost& TheHost() {
   return host;
 }
 
-/// A receiver that drifts among six satellites. CLOCK: the owner of the clock.
+/// Config of a receiver that drifts among six satellites. STATE, ROLE and KEYS stand for a state
+/// entry of the clock, its role in the sensor, and further keys of the sensor.
 const std::string kReceiver =
     "alidade: 1\n"
     "state:\n"
@@ -67,7 +68,7 @@ RunResult RunOf(const std::string& text, int seed = 1) {
   return run;
 }
 
-/// Expects equal metrics of the receiver, which both problems give the same name.
+/// Expects equal metrics of the receiver. It has the same name in both problems.
 void ExpectSameReceiver(const RunResult& a, const RunResult& b, double relative) {
   ASSERT_EQ(a.estimators.size(), b.estimators.size());
   int compared = 0;
@@ -137,7 +138,7 @@ TEST(SensorStates, CanBeConsidered) {
 std::map<std::string, double> MeansOf(const std::string& text, const std::string& metric,
                                       int runs) {
   std::map<std::string, double> means;
-  if (testing::kSanitized) {  // one run shows that no sanitizer reports an error
+  if (testing::kSanitized) {  // one run is enough for a sanitizer to report errors
     RunOf(text);
     return means;
   }
@@ -149,13 +150,13 @@ std::map<std::string, double> MeansOf(const std::string& text, const std::string
   return means;
 }
 
-// Six degrees of freedom that are correlated over the run, and the clock: the sd of the mean over
-// 40 runs is at most 0.1.
+// The receiver has six degrees of freedom, which are correlated over the whole run. The sd of the
+// mean over 40 runs is therefore at most 0.1.
 TEST(SensorStates, AFilterThatOwnsItsClockIsConsistent) {
   for (const auto& [name, nees] : MeansOf(Filled("", "", ""), "nees.mean:receiver", 40)) {
     EXPECT_NEAR(nees, 1.0, 0.25) << name;
   }
-  // A bias that returns to its mean within the run, so its variance matters.
+  // This bias returns to its mean within the run, so its stationary variance matters.
   const std::string markov =
       Filled("", "",
              ", initial: {clock_bias: {mean: 0, sigma: 8}}, dynamics: {clock_bias: {gauss_markov: "
@@ -165,7 +166,8 @@ TEST(SensorStates, AFilterThatOwnsItsClockIsConsistent) {
   }
 }
 
-// The process is stationary from the start: compares the variance of many draws at the end.
+// The process is stationary from the start on. The variance of many draws at the end must equal
+// that at the start.
 TEST(SensorStates, AGaussMarkovStateKeepsItsVariance) {
   const Config config =
       testing::Read(Filled("", "",
@@ -186,7 +188,7 @@ TEST(SensorStates, AGaussMarkovStateKeepsItsVariance) {
   if (testing::kSanitized) return;
   EXPECT_NEAR(sum, 0.0, 0.35);                               // sd 0.08
   EXPECT_NEAR(squares, 4.0, 0.9);                            // sd 0.23
-  EXPECT_NEAR(lagged / squares, std::exp(-0.5 / 1.5), 0.1);  // 2 Hz
+  EXPECT_NEAR(lagged / squares, std::exp(-0.5 / 1.5), 0.1);  // at 2 Hz
 }
 
 const std::string kPose =
@@ -208,7 +210,7 @@ const std::string kPose =
     "  ekf: {type: ekf}\n  iekf: {type: iekf}\n  root: {type: square_root_ekf}\n"
     "  ukf: {type: ukf}\n  rts: {type: rts}\n";
 
-// Twelve degrees of freedom: sd of the mean over 30 runs is at most 0.08.
+// The body has twelve degrees of freedom. The sd of the mean over 30 runs is at most 0.08.
 TEST(SensorStates, AFilterOfPosesIsConsistent) {
   for (const auto& [name, nees] : MeansOf(kPose, "nees.mean:body", 30)) {
     EXPECT_NEAR(nees, 1.0, 0.2) << name;
@@ -218,7 +220,7 @@ TEST(SensorStates, AFilterOfPosesIsConsistent) {
   }
 }
 
-/// Two sensors of a target. The timestamps of the second one are off by up to 50 ms.
+/// Config of two sensors of a target. The timestamps of the second sensor are off by about 50 ms.
 const std::string kLate =
     "alidade: 1\n"
     "state:\n"
@@ -240,8 +242,8 @@ std::string Late(const std::string& offset, const std::string& truth = "") {
   return text.replace(text.find("TRUTH"), 5, truth);
 }
 
-// One degree of freedom a run, and two that are correlated over a second: sd of the means 0.14 and
-// 0.06.
+// The offset has one degree of freedom per run; the target has two, correlated over a second. The
+// sds of the means are 0.14 and 0.06.
 TEST(SensorStates, ATimeOffsetIsEstimatedConsistently) {
   const std::string text = Late("{mean: 0, sigma: 0.05}");
   for (const auto& [name, nees] : MeansOf(text, "nees.mean:right", 100)) {
@@ -261,8 +263,8 @@ TEST(SensorStates, ATimeOffsetOf20MsIsFound) {
   }
 }
 
-// A constant offset equals an estimated one that is known exactly, except for the spread of sigma
-// points, which depends on the number of states.
+// A constant offset and an estimated offset that is known exactly give equal results. Only the
+// spread of the sigma points differs, because it depends on the number of states.
 TEST(SensorStates, ATimeOffsetMayBeAParameter) {
   const RunResult constant = RunOf(Late("0.02")), known = RunOf(Late("{mean: 0.02, sigma: 0}"));
   for (std::size_t i = 0; i < constant.estimators.size(); ++i) {
@@ -274,10 +276,11 @@ TEST(SensorStates, ATimeOffsetMayBeAParameter) {
   const RunResult ignored = RunOf(Late("0.0",
                                        ", overrides: {sensors: {right: {time_offset_s: "
                                        "0.05}}}"));
-  EXPECT_GT(ignored.estimators[0].metrics.at("nees.mean:target"), 1.5) << "50 ms matter";
+  EXPECT_GT(ignored.estimators[0].metrics.at("nees.mean:target"), 1.5)
+      << "an ignored offset of 50 ms must be noticeable";
 }
 
-// The names that `explain` prints.
+// `explain` prints these names.
 TEST(SensorStates, AreMovedByAModelThatIsNamedAfterItsDynamics) {
   const auto name = [](const std::string& dynamics) {
     const Experiment experiment = BuildExperiment(

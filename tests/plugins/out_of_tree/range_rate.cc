@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/model/plugin.h"
 
-/// Range rate of a point, measured by a Doppler radar at the origin: a third party's sensor in one
-/// file.
+/// Range rate of a point, measured by a Doppler radar at the origin. This file is a complete sensor
+/// as a third party would write it.
 ///
 ///   model      z = p . v / |p| + n,   n ~ N(0, sigma^2)
 ///
-/// Defined for  |p| > 0; else out_of_domain, outputs untouched.
+/// Defined for  |p| > 0; else out_of_domain, and the outputs are not changed.
 struct RangeRate : alidade::Sensor<alidade::Vec<1>, alidade::Vec<2>, alidade::Vec<2>> {
   static constexpr std::array kRoles{alidade::Quantity{"position", "m", "of the point", "x,y"},
                                      alidade::Quantity{"velocity", "m/s", "of the point", "x,y"}};

@@ -9,7 +9,7 @@ using alidade::Angle;
 using alidade::Quantity;
 using alidade::Vec;
 
-/// A robot in the plane, driven by its speed and its turn rate.
+/// Robot in the plane. Its speed and its turn rate are the control input.
 ///
 ///   model      x' = x + [cos h, sin h] (v + w0) dt,   h' = h + (o + w1) dt
 ///   noise      w ~ N(0, diag(sigma_v^2, sigma_o^2) / dt)
@@ -43,7 +43,7 @@ struct Planar : alidade::Motion<2, Vec<2>, Angle> {
   }
 };
 
-/// z = x + n, n ~ N(0, sigma^2 I)
+/// Sensor z = x + n, n ~ N(0, sigma^2 I).
 struct PlanarFix : alidade::Sensor<Vec<2>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"position", "m"}};
   static constexpr Quantity kMeasurement{"fix", "m"};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Landmarks of an estimator that uses the measurements accepted by an earlier filter.
+// Test of the landmarks of an estimator that uses the measurements accepted by an earlier filter.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-/// Records when each landmark was initialised, by estimator.
+/// Observer that records the time at which each estimator initialised each landmark.
 class Entries : public RunObserver {
  public:
   void OnEstimate(int estimator, const SourceFrame& frame, const State&,
@@ -25,7 +25,8 @@ class Entries : public RunObserver {
   std::map<int, std::map<std::int64_t, Timestamp>> entered;
 };
 
-// The ekf counts up to `min_observations`; the landmarks that it passes on have already waited.
+// The ekf counts observations up to `min_observations`. The landmarks that it passes on have
+// therefore already waited.
 TEST(AcceptedBy, LandmarksEnterAtTheSameObservation) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
   for (const auto& [key, value] :

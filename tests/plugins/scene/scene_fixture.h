@@ -21,7 +21,7 @@ inline const std::string kSweep =
 inline const std::string kPoints =
     "points: {box: {min: [-2, -1.5, 2], max: [2, 1.5, 6]}, count: 40}";
 
-/// A scene; `keys` are those of `source`, in braces.
+/// Scene, with the config from which it was made.
 struct MadeScene {
   Config config;
   std::unique_ptr<Source> scene;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The camera's measurements of the points, and errors in the config.
+// Tests of the measurements of the points by the camera, and of errors in the config.
 #include <Eigen/Core>
 #include <cmath>
 #include <set>
@@ -25,7 +25,7 @@ std::set<std::int64_t> Ids(const Frame& frame, int stream = 0) {
 }
 
 TEST(Scene, SeesAPointWhereThePinholePutsIt) {
-  // 1 m right, 0.5 m down, 2 m ahead: u = 320 + 525 / 2, v = 240 + 525 / 4.
+  // The point is 1 m to the right, 0.5 m down and 2 m ahead: u = 320 + 525 / 2, v = 240 + 525 / 4.
   const auto frames =
       SceneFrames("max_frames: 2, sigma_px: 0, points: {list: [[1, 0.5, 2]]}, " + kStill);
   ASSERT_EQ(frames.size(), 2u);
@@ -38,8 +38,8 @@ TEST(Scene, SeesAPointWhereThePinholePutsIt) {
 }
 
 TEST(Scene, SeesNothingBehindOrBesideTheImage) {
-  // Of the six points, only 1 and 4 are ahead and in the image: half the width is 320.5 px, 1.221 m
-  // at 2 m.
+  // Of the six points, only 1 and 4 are ahead and in the image. Half the width of the image is
+  // 320.5 px, which is 1.221 m at a distance of 2 m.
   const auto frames = SceneFrames(
       "max_frames: 1, sigma_px: 0, points: {list: [[0, 0, -2], [0, 0, 2], [1.23, 0, 2], [0, 0, 0], "
       "[-1.21, 0, 2], [0, 0.93, 2]]}, " +
@@ -52,7 +52,8 @@ TEST(Scene, DistortsAsTheCameraDoes) {
       "max_frames: 1, sigma_px: 0, points: {list: [[0.4, 0.2, 2]]}, " + kStill, 1,
       "camera: {model: radtan, width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240, "
       "k1: -0.2, k2: 0.05, p1: 0.001, p2: 0.002}\n");
-  // x = 0.2, y = 0.1, q = 0.05: s = 1 - 0.01 + 0.000125 = 0.990125.
+  // With x = 0.2, y = 0.1 and q = x^2 + y^2 = 0.05, the radial factor is 1 - 0.01 + 0.000125 =
+  // 0.990125.
   const double x = 0.2 * 0.990125 + 2 * 0.001 * 0.02 + 0.002 * (0.05 + 0.08);
   const double y = 0.1 * 0.990125 + 0.001 * (0.05 + 0.02) + 2 * 0.002 * 0.02;
   EXPECT_NEAR(frames[0].measurements[0].values[0], 320 + 525 * x, 1e-12);
@@ -69,7 +70,8 @@ TEST(Scene, MeasuresStereoAndDepthToo) {
 }
 
 TEST(Scene, NoiseIsThatOfTheConfig) {
-  // 500 points seen 20 times give 10000 samples of each, with variances accurate to 1.4 %; 4 sigma.
+  // 500 points that are seen 20 times have 10000 samples of each noise. The variances are accurate
+  // to 1.4 %. Tolerances are 4 sigma.
   const std::string keys =
       "max_frames: 20, points: {box: {min: [-1, -0.8, 2], max: [1, 0.8, 3]}, count: 500}, "
       "measures: depth, sigma_depth_m: 0.01, trajectory: {keyframes: [{position: [0, 0, -1], "
@@ -125,7 +127,7 @@ TEST(Scene, TellsTheDepthOfTheFirstObservationOfTheKnown) {
       EXPECT_FALSE(known.contains(m.landmark));
       continue;
     }
-    // The depth along the axis, with a standard deviation of 0.5 % of it.
+    // The depth is measured along the axis, with a standard deviation of 0.5 % of the depth.
     const auto p = *made.scene->TrueLandmark(m.landmark);
     const Vector3d offset = Vector3d(p.data()) - Vector3d(frames[0].truth[0].data());
     Vector3d h;
@@ -140,7 +142,8 @@ TEST(Scene, TellsTheDepthOfTheFirstObservationOfTheKnown) {
   for (const std::int64_t id : known) EXPECT_TRUE(Ids(frames[1]).contains(id));
 }
 
-// A motion forth and back along x in 9 frames, with a rotation of 90 degrees about y.
+// In 9 frames the camera moves forward along x and back, and rotates by 90 degrees about y and
+// back.
 TEST(Scene, KeyframesTellTheWayToOneAnother) {
   const std::string keys =
       "max_frames: 9, rate_hz: 1, points: {list: [[0, 0, 5], [0, 0, 6]]}, trajectory: {keyframes: "
@@ -159,14 +162,16 @@ TEST(Scene, KeyframesTellTheWayToOneAnother) {
     }
     return found;
   };
-  // The keyframe of the frame itself is the landmark after the two points, measured without noise.
+  // The first landmark after the two points is the keyframe of the first frame. The frame measures
+  // it without noise.
   const std::vector<Measurement> first = of_keyframes(0);
   ASSERT_EQ(first.size(), 1u);
   EXPECT_EQ(first[0].landmark, 2);
   EXPECT_EQ(first[0].values, (std::vector<double>{0, 0, 0, 1, 0, 0, 0}));
   EXPECT_EQ(first[0].covariance, std::vector<double>(36, 0.0));
   EXPECT_TRUE(of_keyframes(1).empty());
-  // At the far end: the previous keyframe, seen by a camera that looks along the world's x.
+  // At the far end the camera looks along x of the world. It measures the previous keyframe, and
+  // the keyframe of its own frame.
   const std::vector<Measurement> far = of_keyframes(4);
   ASSERT_EQ(far.size(), 2u);
   EXPECT_EQ(far[0].landmark, 3);
@@ -174,7 +179,8 @@ TEST(Scene, KeyframesTellTheWayToOneAnother) {
   EXPECT_NEAR(far[0].values[0], 0.0, 1e-12);
   EXPECT_NEAR(far[0].values[2], back, 1e-12);
   EXPECT_TRUE(far[0].covariance.empty());
-  // Back at the start: the previous keyframe, the first one, and the frame itself.
+  // Back at the start, the camera measures the previous keyframe, the first keyframe, and the
+  // keyframe of its own frame.
   const std::vector<Measurement> closed = of_keyframes(8);
   ASSERT_EQ(closed.size(), 3u);
   EXPECT_EQ(closed[1].landmark, 2);
@@ -184,14 +190,14 @@ TEST(Scene, KeyframesTellTheWayToOneAnother) {
 }
 
 TEST(Scene, OfTooManyPointsKeepsThoseItSaw) {
-  // Point 0 comes into view from the right when two others are already visible.
+  // Point 0 enters the image from the right when two other points are already visible.
   const auto frames = SceneFrames(
       "max_frames: 30, sigma_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [0, 0, "
       "4], "
       "[0.5, 0, 4]]}, trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}, "
       "{position: [1, 0, 0], euler_deg: [0, 0, 0]}]}");
   for (const SourceFrame& frame : frames) EXPECT_EQ(Ids(frame), (std::set<std::int64_t>{1, 2}));
-  // The next point that leaves makes room.
+  // When one of the other points leaves the image, point 0 is measured.
   const auto all = SceneFrames(
       "max_frames: 30, sigma_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [-2, 0, "
       "4], "
@@ -220,7 +226,8 @@ TEST(Scene, PointsLieWhereTheConfigPutsThem) {
     EXPECT_EQ(std::min(low.minCoeff(), high.minCoeff()), 0.0);
     for (int i = 0; i < 3; ++i) on[i] += low[i] == 0.0, on[3 + i] += high[i] == 0.0;
   }
-  // Faces of 10, 24 and 15 m^2, two of each; 4 sigma of a binomial distribution.
+  // The room has two faces each of 10, 24 and 15 m^2. Tolerances are 4 sigma of a binomial
+  // distribution.
   const double share[3] = {10.0 / 98, 24.0 / 98, 15.0 / 98};
   for (int i = 0; i < 6; ++i) {
     const double p = share[i % 3];

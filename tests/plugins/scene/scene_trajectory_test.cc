@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Curves through way-points and key frames, and the trajectories that use them.
+// Tests of curves through way-points and key frames, and of the trajectories that use these curves.
 #include <Eigen/Geometry>
 #include <cmath>
 
@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-const std::vector<double> kTimes{0.0, 0.7, 1.0, 2.5};  // at unequal intervals
+const std::vector<double> kTimes{0.0, 0.7, 1.0, 2.5};  // with unequal intervals
 
 Quaternion Turned(double x, double y, double z) {
   const double d[3] = {x, y, z};
@@ -42,8 +42,9 @@ TEST(CubicSpline, PassesThroughItsPoints) {
 }
 
 TEST(CubicSpline, SlopeAndCurvatureAreContinuousAndVanishAtTheEnds) {
-  // Differences over h on both sides of each knot. A jump of the slope would appear directly, a
-  // jump of the curvature divided by h. The third derivative is below 200 here: 0.02 at h = 1e-4.
+  // Compares differences over h on both sides of each knot. A jump of the slope would change the
+  // first differences, a jump of the curvature the second differences. The third derivative is
+  // below 200, so it contributes 0.02 for h = 1e-4.
   const CubicSpline spline(kTimes, Points());
   constexpr double h = 1e-4;
   const auto second = [&](double t) {
@@ -54,14 +55,14 @@ TEST(CubicSpline, SlopeAndCurvatureAreContinuousAndVanishAtTheEnds) {
     const Vector3d right = (spline.At(t + h) - spline.At(t)) / h;
     EXPECT_LT((right - left).norm(), 100.0 * h);
     EXPECT_LT((second(t + 2.0 * h) - second(t - 2.0 * h)).norm(), 0.1);
-    EXPECT_GT(second(t).norm(), 5.0);  // else the next checks would be trivial
+    EXPECT_GT(second(t).norm(), 5.0);  // otherwise the next checks would be trivial
   }
   EXPECT_LT(second(0.0 + h).norm(), 0.1);
   EXPECT_LT(second(2.5 - h).norm(), 0.1);
 }
 
 TEST(CubicSpline, IsTheNaturalSplineOfTheTextbook) {
-  // Points 0, 1, 0 at 0, 1, 2: M1 = -3, y(0.5) = 11/16.
+  // The points 0, 1, 0 at the times 0, 1, 2 lead to M1 = -3 and y(0.5) = 11/16.
   const CubicSpline spline({0, 1, 2}, {{0, 0, 0}, {1, 0, 0}, {0, 0, 0}});
   EXPECT_NEAR(spline.At(0.5).x(), 11.0 / 16.0, 1e-15);
   EXPECT_NEAR(spline.At(1.5).x(), 11.0 / 16.0, 1e-15);
@@ -70,7 +71,7 @@ TEST(CubicSpline, IsTheNaturalSplineOfTheTextbook) {
 TEST(CubicSpline, OfTwoPointsIsALineAndOfOneStandsStill) {
   const CubicSpline line({0, 2}, {{0, 0, 0}, {2, 4, 6}});
   EXPECT_LT((line.At(0.5) - Vector3d(0.5, 1, 1.5)).norm(), 1e-15);
-  EXPECT_LT((line.At(-1.0) - Vector3d(-1, -2, -3)).norm(), 1e-14);  // extrapolates linearly
+  EXPECT_LT((line.At(-1.0) - Vector3d(-1, -2, -3)).norm(), 1e-14);  // linear
   EXPECT_EQ(CubicSpline({0}, {{1, 2, 3}}).At(7.0), Vector3d(1, 2, 3));
 }
 
@@ -124,21 +125,21 @@ Vector3d Rotated(const std::vector<double>& q, const Vector3d& x) {
 TEST(ScenePath, LooksAtItsTargetWithTheHorizonLevel) {
   const auto frames = SceneFrames("max_frames: 31, " + kPoints + ", " + kSweep);
   const std::vector<double> q = frames.front().truth[1];
-  // The direction from (-0.5, 0, 0) to (0, 0, 4).
+  // The camera looks from (-0.5, 0, 0) to (0, 0, 4).
   EXPECT_LT((Rotated(q, Vector3d::UnitZ()) - Vector3d(0.5, 0, 4).normalized()).norm(), 1e-14);
   for (const SourceFrame& frame : frames) {
     const Vector3d right = Rotated(frame.truth[1], Vector3d::UnitX());
     const Vector3d down = Rotated(frame.truth[1], Vector3d::UnitY());
     EXPECT_NEAR(right.y(), 0.0, 1e-14);
     EXPECT_GT(right.x(), 0.9);
-    EXPECT_GT(down.y(), 0.9);  // y points down in the world, as in the camera
+    EXPECT_GT(down.y(), 0.9);  // y points down both in the world and in the camera
   }
   const auto& last = frames.back().truth;
   EXPECT_LT((Vector3d(last[0].data()) - Vector3d(0.5, 0.1, 0.2)).norm(), 1e-14);
 }
 
 TEST(ScenePath, EveryFormOfAnOrientationSaysTheSame) {
-  // Rotated by 90 degrees about y the camera looks along x.
+  // A camera that is rotated by 90 degrees about y looks along x.
   const auto ahead = [](const std::string& orientation) {
     const auto frames =
         SceneFrames("max_frames: 1, " + kPoints +
@@ -151,7 +152,8 @@ TEST(ScenePath, EveryFormOfAnOrientationSaysTheSame) {
                            "quaternion: {w: 0.70710678, x: 0, y: 0.70710678, z: 0}"}) {
     EXPECT_LT((ahead(form) - Vector3d::UnitX()).norm(), 1e-7) << form;
   }
-  // Rz(90) Ry(0) Rx(90): the x rotation turns z to -y, the z rotation turns -y to x.
+  // In Rz(90) Ry(0) Rx(90), the rotation about x maps z to -y, and the rotation about z maps -y to
+  // x.
   EXPECT_LT((ahead("euler_deg: [90, 0, 90]") - Vector3d::UnitX()).norm(), 1e-15);
 }
 
@@ -179,8 +181,8 @@ TEST(ScenePath, VelocitiesLeadFromFrameToFrameAsQuaternionPoseHasIt) {
 }
 
 TEST(ScenePath, DrawnFromTheModelHasItsAccelerations) {
-  // The second differences of 5000 steps give standard deviations accurate to 1 / sqrt(2 * 5000) =
-  // 1 %; 4 sigma.
+  // The differences of 5000 steps have standard deviations accurate to 1 / sqrt(2 * 5000) = 1 %.
+  // Tolerances are 4 sigma.
   const auto frames = SceneFrames("max_frames: 5001, rate_hz: 10, " + kPoints +
                                   ", trajectory: {random: {linear_acceleration: [0.3, 0.6, 0], "
                                   "angular_acceleration: 0.05}}");
@@ -217,7 +219,7 @@ TEST(ScenePath, OdometryLeadsAlongTheTruth) {
   const auto& last = frames.back().truth;
   for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(r[i], last[0][i], 1e-12);
   for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(q[i], last[1][i], 1e-12);
-  // the last frame has no odometry
+  // The last frame has no odometry.
   for (const Measurement& m : frames.back().measurements) EXPECT_NE(m.stream, 1);
 }
 

@@ -6,7 +6,7 @@ namespace {
 
 class CalibrationFileForms : public testing::TracksTest {
  protected:
-  /// Returns a model's value of a calibration key, or the error.
+  /// Returns the value that a model reads from a calibration key, or the error.
   std::string Get(const std::string& text, const std::string& key) {
     Write("tracks.csv", "0,1,0,5\n0,1,1,6\n");
     Write("calibration.yaml", text);
@@ -117,7 +117,7 @@ TEST_F(CalibrationFileForms, WhatNoCameraHereDoesIsRefused) {
   expect(changed(kKalibr, "pinhole", "omni"), "'omni'");
   expect(changed(kKalibr, "equidistant", "fov"), "'fov'");
   expect(changed(kRos, "401", "nan"), "camera_matrix");
-  expect(changed(kRos, "[400, 0,", "[400, 2,"), "without skew");
+  expect(changed(kRos, "[400, 0,", "[400, 2,"), "zero skew");
   expect(changed(kRos, "[0, 0, 0, 0, 0]", "[0, 0, 0, 0, 0, 0.1, 0, 0]"), "beyond the first 5");
 }
 

@@ -18,7 +18,7 @@ namespace alidade::testing {
 
 namespace fs = std::filesystem;
 
-/// Test with its own folder, which contains tracks.csv and the files next to it.
+/// Test in a temporary folder, which contains tracks.csv and the files next to it.
 class TracksTest : public ::testing::Test {
  protected:
   void Write(const std::string& name, const std::string& text) const {
@@ -26,7 +26,7 @@ class TracksTest : public ::testing::Test {
   }
   fs::path File() const { return folder_ / "tracks.csv"; }
 
-  /// Opens the source with `keys` (those of `source`, in braces) on the folder.
+  /// Opens the source for the folder. `keys` are the keys of `source`, without its braces.
   std::unique_ptr<Source> Open(const std::string& keys = "rate_hz: 10",
                                const std::string& path = "tracks.csv") {
     config_ = std::make_unique<Config>(
@@ -51,7 +51,7 @@ class TracksTest : public ::testing::Test {
     return Frames();
   }
 
-  /// Expects that `work` fails with `code` and with exactly `message`, in which DIR/ is replaced by
+  /// Expects that `work` fails with `code` and with exactly `message`. DIR/ in `message` stands for
   /// the folder.
   void ExpectError(ExitCode code, std::string message, const std::function<void()>& work) const {
     for (auto at = message.find("DIR/"); at != std::string::npos; at = message.find("DIR/")) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Reading of tracks: representations, times, the files next to the tracks, pipes, real data.
+// Tests of reading tracks: representations, times, the files next to the tracks, pipes and real
+// data.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -81,8 +82,8 @@ TEST_F(TracksTest, MayBeginLaterAndWithoutTheFeaturesOfBefore) {
       [&] { ids(", start_frame: 4"); });
 }
 
-// The camera of frame 1 is at (1, 2, 3), rotated by 90 degrees about z: its x axis is the file's y
-// axis.
+// The camera of frame 1 is at (1, 2, 3), rotated by 90 degrees about z. Its x axis is then the y
+// axis of the file's world.
 TEST_F(TracksTest, TheWorldMayBeTheFirstCamera) {
   Write("tracks.csv", "0,1,0,1\n0,1,1,1\n1,1,0,2\n1,1,1,2\n2,1,0,4\n2,1,1,4\n");
   Write("truth.tum", "0.1 1 2 3 0 0 0.7071067811865476 0.7071067811865476\n0.2 1 7 3.5 0 0 1 0\n");
@@ -113,8 +114,9 @@ TEST_F(TracksTest, TimestampsSayWhatFramesThereAre) {
   EXPECT_TRUE(frames[2].measurements.empty());
   EXPECT_EQ(frames[1].timestamp, 600'000'000);
   EXPECT_EQ(Frames("max_frames: 2").size(), 2u);
-  EXPECT_EQ(Frames("max_frames: 2", ".").size(), 2u) << "a folder stands for its tracks.csv";
-  EXPECT_EQ(Frames("rate_hz: 4")[0].timestamp, 250'000'000) << "a rate comes first";
+  EXPECT_EQ(Frames("max_frames: 2", ".").size(), 2u) << "the path of a folder means its tracks.csv";
+  EXPECT_EQ(Frames("rate_hz: 4")[0].timestamp, 250'000'000)
+      << "rate_hz has priority over timestamps.csv";
 }
 
 TEST_F(TracksTest, OdometryIsHeldOrTheMeanOfAStep) {
@@ -151,8 +153,8 @@ TEST_F(TracksTest, TruthIsTakenAtTheTimeOfAFrame) {
   EXPECT_EQ(source->truths()[1].name, "robot.orientation");
   const auto frames = Frames("state_entry: robot");
   EXPECT_EQ(frames[0].truth.at(0), (Values{1, 2, 3}));
-  EXPECT_EQ(frames[0].truth[1], (Values{0.5005, 0.5, 0.5, 0.5})) << "w first";
-  EXPECT_TRUE(frames[1].truth[0].empty()) << "2 ms off";
+  EXPECT_EQ(frames[0].truth[1], (Values{0.5005, 0.5, 0.5, 0.5})) << "w is the first element";
+  EXPECT_TRUE(frames[1].truth[0].empty()) << "the true pose is 2 ms away";
   EXPECT_EQ(frames[2].truth[0], (Values{7, 8, 9}));
   EXPECT_EQ(Frames("truth_tolerance_s: 0.002")[1].truth[0], (Values{4, 5, 6}));
 }
@@ -178,7 +180,7 @@ TEST_F(TracksTest, ReadsAPipeAsItIsWritten) {
   });
   const auto source = Open();
   SourceFrame frame;
-  EXPECT_TRUE(source->Next(frame));  // returns although the pipe is still open
+  EXPECT_TRUE(source->Next(frame));  // Next() returns although the pipe is still open
   EXPECT_EQ(frame.measurements.at(0).values, (Values{1, 2}));
   writer.join();
   EXPECT_EQ(write(descriptor, "1,3,1,6\n", 8), 8);
@@ -190,7 +192,7 @@ TEST_F(TracksTest, ReadsAPipeAsItIsWritten) {
 
 // Fault 47 of tests/faults/README.md.
 TEST_F(TracksTest, StreamsALongFileInConstantMemory) {
-  // A pipe of 2e6 rows, about 30 MB, written by a thread; the peak may grow by 4 MB.
+  // A thread writes 2e6 rows, about 30 MB, to a pipe. The peak memory may grow by 4 MB.
   const auto peak_kb = [] {
     std::ifstream status("/proc/self/status");
     for (std::string word; status >> word;) {
@@ -233,7 +235,7 @@ TEST_F(TracksTest, ReadsRealTracks) {
     EXPECT_EQ(frame.truth.at(0).size(), 3u);
     for (const Measurement& m : frame.measurements) observations += m.stream == 0;
   }
-  EXPECT_EQ(observations, (42005u - 1) / 4);  // rows below the header, four for each observation
+  EXPECT_EQ(observations, (42005u - 1) / 4);  // four rows below the header for each observation
   EXPECT_EQ(frames[0].measurements[0].values[0], 343.4486);
   const Measurement& odometry = frames[0].measurements.back();
   EXPECT_NEAR(odometry.values[0], 0.5 * (13.172717 + 13.129880), 1e-12);

@@ -41,7 +41,7 @@ enum class Outcome {
 struct OutcomeInfo {
   Outcome outcome;
   const char* name;     ///< name in files
-  const char* meaning;  ///< a phrase for the documentation
+  const char* meaning;  ///< description in the documentation
   /// Whether the outcome counts as a rejection for rejection recovery. An outcome `not_finite`
   /// counts only if h was computed.
   bool is_rejection = false;
@@ -147,8 +147,8 @@ struct MeasurementReport {
   Numbers gain;
 };
 
-/// Reports of the measurements of a frame. Can also store the numbers of the reports: Copy adds
-/// numbers, and a copy of this object stores all of them.
+/// Reports of the measurements of a frame. Usually points to numbers in the estimator. Copy stores
+/// numbers in this object, and a copy of this object stores all its numbers.
 class MeasurementReports {
  public:
   MeasurementReports() = default;

@@ -54,7 +54,7 @@ const SensorBinding* SensorOf(const Problem& problem, const Prior& prior) {
 std::optional<ProblemDefect> CheckStart(const Problem& problem, const Prior& prior) {
   const SensorBinding* const sensor = SensorOf(problem, prior);
   if (sensor == nullptr) {
-    ProblemDefect defect{"from_measurement", "no sensor '" + prior.sensor + "' here",
+    ProblemDefect defect{"from_measurement", "no sensor '" + prior.sensor + "' in this estimator",
                          "a sensor of this estimator", prior.block};
     defect.nearest = Nearest(prior.sensor, internal::NamesOf(problem.sensors));
     return defect;
@@ -73,7 +73,8 @@ std::optional<ProblemDefect> FindCycle(const Problem& problem, std::vector<Block
   if (std::ranges::find(chain, last) != chain.end() - 1) {
     std::vector<std::string> names;
     for (const BlockId block : chain) names.push_back(problem.layout[block].name);
-    return ProblemDefect{"from_measurement", "cyclic: " + internal::Join(names, " <- "),
+    return ProblemDefect{"from_measurement",
+                         "cyclic initialisation: " + internal::Join(names, " <- "),
                          "a mean for one block of the cycle", last};
   }
   const auto prior = std::ranges::find(problem.priors, last, &Prior::block);

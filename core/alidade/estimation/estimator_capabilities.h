@@ -24,7 +24,7 @@ const char* ToString(EstimatorKind kind);
 /// are estimated or constant.
 struct EstimatorCapabilities {
   bool consider = false;          ///< consider blocks and roles (Schmidt)
-  bool known = true;              ///< roles with the mode known
+  bool known = true;              ///< roles with RoleMode::kKnown
   bool at_measurement = false;    ///< roles with `jacobian_at: measurement`
   bool from_measurement = false;  ///< blocks that start from their first measurement
   bool recovery = false;          ///< recovery after consecutive rejections

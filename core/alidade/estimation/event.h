@@ -59,7 +59,7 @@ struct EventKindInfo {
   EventKind kind;
   const char* name;  ///< name in files
   EventSeverity severity;
-  const char* meaning;  ///< a phrase for the documentation
+  const char* meaning;  ///< description in the documentation
 };
 
 /// All kinds of events. To add a kind, add a value of EventKind and an entry here.

@@ -14,7 +14,7 @@
 
 namespace alidade {
 
-/// How the measurements of one timestamp are grouped into updates.
+/// Division of the measurements of one timestamp into updates.
 enum class Fuse {
   kJoint,           ///< one stacked update
   kPerSensor,       ///< one update for each sensor, in the order of the config
@@ -136,7 +136,7 @@ class Filter : public Estimator {
 
   const Problem& problem() const;
 
-  // Live use: processing reading by reading.
+  // Live use: processing of readings, and predictions.
   /// Returns the index of a stream, the value of Reading::stream. Throws Error kBadConfig if the
   /// name is unknown.
   int stream(std::string_view name) const;

@@ -43,8 +43,7 @@ struct LandmarkOptions {
   static constexpr int kUnlimited = std::numeric_limits<int>::max();
 
   std::optional<Prior> prior;
-  /// Maximum number of landmarks in the state that a frame measures. A frame initialises new
-  /// landmarks up to this number.
+  /// A frame initialises new landmarks until it measures this number of landmarks in the state.
   int max_per_frame = kUnlimited;
   /// Number of the observation that initialises a landmark. 1: the first one.
   int min_observations = 1;
@@ -89,7 +88,7 @@ struct LandmarkEstimate {
   Timestamp first = kNoTimestamp, last = kNoTimestamp;
   Timestamp removed =
       kNoTimestamp;             ///< time of removal; kNoTimestamp: the landmark is in the state
-  int tried = 0, accepted = 0;  ///< number of measurements, and of accepted ones
+  int tried = 0, accepted = 0;  ///< number of all measurements, and of accepted measurements
 };
 
 /// Counts of changes to landmarks in one frame, or in all frames.

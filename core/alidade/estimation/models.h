@@ -60,10 +60,10 @@ class SensorModel {
     std::string origin;  ///< path of the plugin; empty: not from a plugin
     std::vector<Space> roles;
     Space measurement;
-    Space known = {};  ///< known numbers of each measurement; name empty: not used
+    Space known = {};  ///< known numbers of each measurement; not used if the name is empty
     InverseModel inverse = {};
     std::map<std::size_t, OwnedRole> owned =
-        {};                     ///< by role, if the model defines prior and dynamics
+        {};                     ///< by role: prior and dynamics, if the model defines them
     bool has_validity = false;  ///< whether Valid may reject a measurement
     /// L of R = L L', m x m row-major, which replaces the L of the model. Empty: the L of the model
     /// is used.
@@ -164,7 +164,7 @@ class MotionModel {
     std::string name;    ///< name of the model
     std::string origin;  ///< path of the plugin; empty: not from a plugin
     std::vector<Space> blocks;
-    Space input = {};  ///< the control input; name empty: not used
+    Space input = {};  ///< the control input; not used if the name is empty
     int noise_size = 0;
     bool stationary = false;      ///< the blocks never change: Step need not be called
     bool discrete_noise = false;  ///< w is constant from one update to the next

@@ -45,7 +45,8 @@ struct StepOutput {
 /// means w = 0.
 Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
                const double* u, const double* w, double dt_s, const StepOutput& output);
-/// Converts an outcome of StepAt into an error. kAccepted becomes "no error".
+/// Converts an outcome of StepAt to an error. Returns a StepError that converts to false if the
+/// outcome is kAccepted.
 StepError StepErrorOf(const MotionBinding& motion, Outcome outcome);
 /// Copies x' to x for the blocks that are not constant, and normalises them to their manifolds.
 inline void TakeStep(const MotionPlace& place, const double* next, double* x) {

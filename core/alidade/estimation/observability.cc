@@ -372,7 +372,7 @@ std::vector<std::vector<std::string>> internal::UnobservableDirections(
       const std::string& name = start.names[static_cast<std::size_t>(i)];
       if (names.empty() || names.back() != name) names.push_back(name);
     }
-    // A direction of landmarks alone becomes observable when the trajectory continues.
+    // A direction that changes only landmarks becomes observable as the trajectory continues.
     if (!landmark_problem || names.front() != internal::kLandmarks)
       directions.push_back(std::move(names));
   }

@@ -52,7 +52,7 @@ struct SensorBinding {
   std::string stream;
   SharedSensor model;
   std::vector<RoleBinding> roles;
-  RobustLoss loss = {};  ///< on the Mahalanobis distance of the innovation
+  RobustLoss loss = {};  ///< loss of the Mahalanobis distance of the innovation
   /// Model of the same sensor for landmarks with the representation xyz. Required if `model` has
   /// another representation, and landmarks are converted to xyz or start as xyz. The roles before
   /// the landmark equal those of `model`.
@@ -82,7 +82,8 @@ struct Prior {
   std::vector<double> mean;
   Eigen::MatrixXd covariance;
   std::string
-      sensor;  ///< sensor that initialises the block; "": it starts from mean and covariance
+      /// Sensor that initialises the block. "": the block starts from mean and covariance.
+      sensor;
 };
 
 /// Initial value of a block of a state: a mean with standard deviations, or the first measurement
@@ -111,7 +112,8 @@ struct InitialValue {
   std::vector<double> mean, sigma;
   Eigen::MatrixXd covariance;  ///< empty: `sigma` is used
   BlockStatus status = BlockStatus::kEstimated;
-  std::string sensor;  ///< sensor that initialises the block; empty: `mean` and `sigma` are used
+  /// Sensor that initialises the block. Empty: the block starts from `mean` and `sigma`.
+  std::string sensor;
 };
 
 /// Model parameter state of a sensor, such as a bias: its initial value and process.

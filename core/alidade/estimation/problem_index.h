@@ -50,7 +50,7 @@ struct MotionPlace {
   std::vector<int> at;                          ///< by row of F: row of P; -1: not in P
   std::vector<int> rows;                        ///< rows of P that belong to the blocks
   std::vector<int> present;                     ///< by element of `rows`: row of F
-  bool holds = false;  ///< whether the noise is discrete, constant over an interval
+  bool holds = false;  ///< whether the noise is discrete (constant over an interval)
 };
 
 /// Problem with its names resolved to indices: the stream of each sensor, and the offsets of the

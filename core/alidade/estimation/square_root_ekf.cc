@@ -132,7 +132,7 @@ Outcome SquareRootEquations::Correct(FilterState& f, std::span<PendingMeasuremen
   const StackedMeasurements stacked = Stack(f, rows);
   const Eigen::Index n = root_.rows(), m = stacked.h.rows();
   Workspace::Matrix array = f.work.Take(m + n, m + n),
-                    hl = f.work.Take(m, n);  // array is the transposed array
+                    hl = f.work.Take(m, n);  // the transposed array, and H L
   array.setZero();
   Eigen::Index offset = 0;
   for (const PendingMeasurement* pending : rows) {

@@ -43,7 +43,7 @@ void RecordGain(const FilterState& f, std::span<PendingMeasurement* const> rows,
 /// Matrices of all measurements of an update.
 struct StackedMeasurements {
   Workspace::Matrix h, noise;    ///< H (m x n), R (m x m)
-  Workspace::Vector innovation;  ///< m
+  Workspace::Vector innovation;  ///< stacked innovations, size m
 };
 
 /// Returns the stacked H, R and innovation, stored in f.work.

@@ -17,7 +17,7 @@ struct UkfOptions {
   EkfOptions filter;    ///< gate, fuse and max_dt_s; `rejection_recovery` is ignored
   double alpha = 0.01;  ///< spread of the sigma points, in [1e-4, 1]
   double beta = 2.0;  ///< weight of the centre in the covariance, >= 0; 2 is optimal for a Gaussian
-  double kappa = 0.0;  ///< is added to the number of directions N in the spread, >= 0
+  double kappa = 0.0;  ///< added to N, the number of directions, in the spread; >= 0
 };
 
 /// Unscented Kalman filter: computes the moments of y = g(x), x ~ N(x0, A A'), from 2N + 1 sigma

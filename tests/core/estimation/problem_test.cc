@@ -238,7 +238,8 @@ TEST(Problem, AFilterRefusesABlockThatCannotStart) {
   };
   EXPECT_EQ(refusal("position", "stereo"), "nothing");
   EXPECT_EQ(refusal("position", "stero"),
-            "Ekf: from_measurement: no sensor 'stero' here (block 'target.position'); expected a "
+            "Ekf: from_measurement: no sensor 'stero' in this estimator (block 'target.position'); "
+            "expected a "
             "sensor of this estimator; did you mean 'stereo'?");
   EXPECT_EQ(refusal("velocity", "stereo"),
             "Ekf: from_measurement: sensor 'stereo' does not determine this block (block "
@@ -254,7 +255,8 @@ TEST(Problem, AFilterRefusesACycleOfFirstMeasurements) {
   problem.AddSensor("a_by_b", Scale2d::FromPixels(300.0, 1.0), {b["value"], a["value"]});
   problem.AddSensor("b_by_a", Scale2d::FromPixels(300.0, 1.0), {a["value"], b["value"]});
   EXPECT_EQ(RefusalOf([&] { Ekf filter(problem); }),
-            "Ekf: from_measurement: cyclic: a.value <- b.value <- a.value (block 'a.value'); "
+            "Ekf: from_measurement: cyclic initialisation: a.value <- b.value <- a.value (block "
+            "'a.value'); "
             "expected a mean for one block of the cycle");
 }
 

@@ -125,7 +125,7 @@ const Fault kKeyFaults[] = {
     MakeFault(
         "03_missing_nested_key_with_a_like_one", "depth", {{"noise", "niose"}}, 3,
         "state.target.noise.acceleration: missing; model 'constant_velocity' needs it (m/s^1.5, >= "
-        "0: random acceleration, root of its spectral density); found 'niose' at line 6"),
+        "0: root of the spectral density of the acceleration); found 'niose' at line 6"),
     MakeFault("09_wrong_unit", "depth", {{"baseline_m: 0.065", "baseline_mm: 65"}}, 20,
               "baseline_m"),
     MakeFault("10_loss_scale_zero", "depth", {After(kStereoSigma, "    loss: {huber: 0}")}, 22,

@@ -92,7 +92,8 @@ TEST_F(SharedParametersTest, AModelsOwnComplaintNamesTheMap) {
             ", model: photogrammetric, k1: 0, k2: 0, baseline_m: 1}\nsensors: {s: {sigma_px: 1}}");
   ExpectError(
       ExitCode::kBadConfig,
-      {"test.yaml:1:78 camera.model: is not 'pinhole'; expected pinhole, because a rectified pair"},
+      {"test.yaml:1:78 camera.model: is not 'pinhole'; expected pinhole, because a rectified "
+       "stereo pair"},
       [&] { Shipped().CreateSensor("stereo_feature", config.root().At("sensors").At("s")); });
 }
 

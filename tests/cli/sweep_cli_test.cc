@@ -393,7 +393,8 @@ TEST_F(SweepCli, TellsHowOftenTheReferenceWasWithheld) {
   const Outcome sweep = Call(arguments);
   ASSERT_EQ(sweep.code, 0) << sweep.err;
   const std::string words =
-      "\nerrors are differences from estimator 'bad', an estimate itself: no coverage, no NEES; "
+      "\nerrors are differences from estimator 'bad', which is not the truth: no coverage, no "
+      "NEES; "
       "withheld in 2 of 2 runs, in which the reference failed, diverged or had no estimates\n";
   EXPECT_TRUE(Contains(sweep.out, words)) << sweep.out;
   EXPECT_TRUE(Contains(Read("out/table.md"), words)) << Read("out/table.md");

@@ -188,7 +188,7 @@ const Fault kBlockFaults[] = {
                {kTemplateBlock, "template.depth"},
                {kDepthSource, Rows("truth: {depth_rate: s,\n  depth: d}")}},
               29,
-              "source.truth.depth: the truth does not match a block: it may belong to target.depth "
+              "source.truth.depth: the truth does not match a block: it could be target.depth "
               "or template.depth"),
     MakeFault("44_geometry_of_a_role", "depth",
               {After(kTemplateBlocks, "    size: 2"), {"mean: 3.3", "mean: [3.3, 1]"}}, 26,
@@ -209,9 +209,10 @@ const Fault kEstimatorFaults[] = {
               "you mean 'batch'?"),
     MakeFault("02_unknown_key_of_an_estimator", "depth", {{kEkf, "{type: ekf, gaet: 1}"}}, 30,
               "did you mean 'gate'"),
-    MakeFault("02_use_of_no_choice", "depth", {After(kEkf, "  other: {type: ekf, use: some}")}, 31,
-              "estimators.other.use: 'some' is not a choice of data; expected all, or "
-              "{accepted_by: NAME}"),
+    MakeFault(
+        "02_use_of_no_choice", "depth", {After(kEkf, "  other: {type: ekf, use: some}")}, 31,
+        "estimators.other.use: 'some' is not a valid choice of measurements; expected all, or "
+        "{accepted_by: NAME}"),
     MakeFault("02_use_of_no_estimator", "depth",
               {After(kEkf, "  other: {type: ekf, use: {accepted_by: efk}}")}, 31,
               "estimators.other.use.accepted_by: no estimator 'efk'; expected a name from "
@@ -324,9 +325,9 @@ const Fault kLandmarkFaults[] = {
     MakeFault("landmarks_outlier_rejection_unknown", "landmarks",
               {After("sigma_px: 1.0", "    outlier_rejection: {method: two_point_ransac}")}, 17,
               "sensors.pixels.outlier_rejection.method"),
-    MakeFault(
-        "landmarks_prior_missing", "landmarks", {{kPrior, "max_per_frame: 30"}}, 10,
-        "landmarks: no prior: model 'pixels' of sensor 'pixels' does not determine the distance"),
+    MakeFault("landmarks_prior_missing", "landmarks", {{kPrior, "max_per_frame: 30"}}, 10,
+              "landmarks: a prior is missing: model 'pixels' of sensor 'pixels' does not determine "
+              "the distance"),
     MakeFault("landmarks_ransac_of_one", "pose",
               {After("sigma_px: 1.0", "    outlier_rejection: {method: one_point_ransac}"),
                {kEkf, "{type: ekf, fuse: per_measurement}"}},
@@ -350,7 +351,8 @@ const Fault kLandmarkFaults[] = {
               {{"representation: inverse_depth", "representation: xyz"},
                {"inverse_distance: 0.5", "inverse_distance: 0"}},
               14,
-              "landmarks.prior.inverse_distance: a landmark at infinity cannot be xyz; expected "
+              "landmarks.prior.inverse_distance: a landmark at infinity cannot have the "
+              "representation xyz; expected "
               "a value above 0, 1/m"),
     MakeFault(
         "landmarks_xyz_to_xyz", "landmarks",

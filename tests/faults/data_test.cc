@@ -322,7 +322,7 @@ TEST_F(DataFault, QuaternionsOfAnotherLengthAreNormalisedAndCounted) {
   EXPECT_TRUE(
       Contains(table.err,
                "turn.csv:3 orientation: the length of a unit quaternion is off by 0.004988; "
-               "expected unit length to 1e-3"))
+               "expected a length within 1e-3 of 1"))
       << table.err;
 }
 
@@ -331,11 +331,11 @@ TEST_F(DataFault, ATruthThatNoFrameHasIsTold) {
   Write("truth.tum", "1000 0 0 0 0 0 0 1\n");
   const Outcome run = Run("map.yaml");
   EXPECT_TRUE(Contains(run.out,
-                       "no frame has the truth of cam.position, cam.orientation; do its times "
+                       "no frame contains the truth of cam.position, cam.orientation; do its times "
                        "match those of the measurements?"))
       << run.out;
   Write("truth.tum", "0 0 0 0 0 0 0 1\n");
-  EXPECT_FALSE(Contains(Run("map.yaml").out, "no frame has the truth"));
+  EXPECT_FALSE(Contains(Run("map.yaml").out, "no frame contains the truth"));
 }
 
 // The choice between q and -q depends on the order of the timestamps, not on the order of arrival.

@@ -7,7 +7,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns whether each measurement of a sensor was used, in the order of the frame and the report.
+/// Returns for each measurement of a sensor whether the estimator used it. The order is that of the
+/// frame and the report.
 std::vector<bool> UsedMeasurements(int sensor, const UpdateReport& report) {
   std::vector<bool> used;
   for (const MeasurementReport& entry : report.measurements()) {
@@ -22,7 +23,8 @@ std::vector<bool> UsedMeasurements(int sensor, const UpdateReport& report) {
 Frame AcceptedMeasurements(const Frame& frame, const std::vector<StreamInfo>& streams,
                            const Problem& problem, const UpdateReport& report) {
   Frame accepted{frame.timestamp, {}};
-  std::vector<std::optional<std::vector<bool>>> used(streams.size());  // empty: no sensor reads it
+  // Nullopt: no sensor reads the stream.
+  std::vector<std::optional<std::vector<bool>>> used(streams.size());
   for (int sensor = 0; sensor < std::ssize(problem.sensors); ++sensor) {
     const std::string& stream = problem.sensors[static_cast<std::size_t>(sensor)].stream;
     const auto found = std::ranges::find(streams, stream, &StreamInfo::name);

@@ -16,8 +16,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns the capabilities of the estimator of a plugin. An estimator that does not declare them
-/// must itself reject problems that it does not support.
+/// Returns the capabilities of a plugin's estimator. An estimator that does not declare its
+/// capabilities must itself reject problems that it does not support.
 const EstimatorCapabilities& CapabilitiesOf(const PluginEntry& entry) {
   static constexpr EstimatorCapabilities kUndeclared = {
       .consider = true, .at_measurement = true, .from_measurement = true};
@@ -25,8 +25,8 @@ const EstimatorCapabilities& CapabilitiesOf(const PluginEntry& entry) {
   return capabilities != nullptr ? *capabilities : kUndeclared;
 }
 
-/// Returns the index of the stream that the entry of a sensor or an input names. Its size must be
-/// `size`; the error names `wanted_by` as the reason.
+/// Returns the index of the stream that the entry of a sensor or an input names. The size of the
+/// stream must be `size`. If it is not, the error message contains `wanted_by` as the reason.
 int FindStreamOf(const Node& entry, int size, const std::string& wanted_by,
                  const std::vector<StreamInfo>& streams) {
   const Node node = entry.At("stream");
@@ -45,8 +45,8 @@ int FindStreamOf(const Node& entry, int size, const std::string& wanted_by,
   return static_cast<int>(index);
 }
 
-/// Returns the names of the sensors of an estimator in its own order; empty means all sensors in
-/// the order of the config.
+/// Returns the names of the sensors that an estimator lists, in the order of the list. An empty
+/// result means all sensors, in the order of the config.
 std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
   std::vector<std::string> names;
   const auto list = entry.Find("sensors");
@@ -106,7 +106,8 @@ const PluginEntry& FindPluginEstimator(const std::string& type, const PluginHost
   FailUnknownType(type, host, node);
 }
 
-/// Rejects a problem, read from the config `root`, that needs more than `capabilities`.
+/// Rejects a problem that needs more than `capabilities`. The problem was read from the config
+/// `root`.
 void RefuseUnsupported(const std::string& type, const EstimatorCapabilities& capabilities,
                        const Node& root, const Problem& problem) {
   const auto defect = FindUnsupported(problem, capabilities);
@@ -116,8 +117,8 @@ void RefuseUnsupported(const std::string& type, const EstimatorCapabilities& cap
             defect->remedy + " (also by the estimator's `overrides`), or type: ekf");
 }
 
-/// Rejects keys of other estimator types that are still unread after the keys of this type were
-/// read.
+/// Rejects keys that only other estimator types have. Must be called after the keys of this type
+/// were read.
 void RefuseUnsupportedKeys(const std::string& type, const Node& entry) {
   constexpr std::pair<const char*, const char*> kKeys[] = {
       {"gate", "gate"},
@@ -131,7 +132,8 @@ void RefuseUnsupportedKeys(const std::string& type, const Node& entry) {
   }
 }
 
-/// Rejects `fuse: per_measurement` if a sensor has `outlier_rejection`, which compares matches.
+/// Rejects `fuse: per_measurement` if a sensor has `outlier_rejection`, which compares several
+/// matches.
 void RefuseSingleMatches(const Node& entry, const Problem& problem) {
   const auto fuse = entry.Find("fuse");
   if (!fuse || fuse->Text() != "per_measurement") return;
@@ -144,7 +146,7 @@ void RefuseSingleMatches(const Node& entry, const Problem& problem) {
 }
 
 /// Rejects overrides of keys that all estimators share. Also rejects an override of an entry that
-/// `root` does not have, unless `merged` has a model for it.
+/// `root` does not contain, unless the entry in `merged` has a model.
 void CheckOverrides(const Node& overrides, const Node& root, const Node& merged) {
   for (const auto& [key, value] : overrides.Entries()) {
     if (key == "initial_time_s" || key == "landmarks") continue;
@@ -164,8 +166,8 @@ void CheckOverrides(const Node& overrides, const Node& root, const Node& merged)
   }
 }
 
-/// Rejects `filter` if its accepted measurements do not determine the data of `spec`. `key` is the
-/// node of the error.
+/// Rejects `filter` if the measurements that it accepts do not determine the data of `spec`. Errors
+/// refer to the node `key`.
 void CheckAccepts(const EstimatorSpec& filter, const EstimatorSpec& spec, const Node& key) {
   const std::string quoted = '\'' + filter.name + '\'';
   if (filter.estimator->offline()) {
@@ -187,7 +189,8 @@ void CheckAccepts(const EstimatorSpec& filter, const EstimatorSpec& spec, const 
   }
 }
 
-/// Rejects a control input of `spec` that is also a measurement of `filter`, which may reject it.
+/// Rejects a control input of `spec` that is also a measurement of `filter`, because `filter` may
+/// reject this measurement.
 void CheckInputs(const EstimatorSpec& filter, const EstimatorSpec& spec, const Node& key) {
   for (const MotionBinding& motion : spec.problem.motions) {
     const std::string& stream = motion.input.stream;
@@ -202,12 +205,14 @@ void CheckInputs(const EstimatorSpec& filter, const EstimatorSpec& spec, const N
 }
 
 /// Returns the index of the estimator whose accepted measurements `spec` uses according to the key
-/// `use`; -1 if it uses all. `earlier_estimators` are those listed before it. Error: kBadConfig.
+/// `use`; -1 if it uses all measurements. `earlier_estimators` are the estimators listed before
+/// `spec`. Error: kBadConfig.
 int ReadUse(const Node& use, const EstimatorSpec& spec, const Node& estimators,
             const std::vector<EstimatorSpec>& earlier_estimators) {
   if (!use.is_map()) {
     if (use.Text() == "all") return -1;
-    use.Fail("'" + use.Text() + "' is not a choice of data", "all, or {accepted_by: NAME}");
+    use.Fail("'" + use.Text() + "' is not a valid choice of measurements",
+             "all, or {accepted_by: NAME}");
   }
   const Node key = use.At("accepted_by", "use");
   const std::string name = key.Text();
@@ -292,7 +297,7 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
     const auto rollback = order ? order->Find("policy") : std::nullopt;
     if (spec.on_plugin_failure == OnPluginFailure::kDisable && rollback &&
         rollback->Text() == "rollback") {
-      policy->Fail("a rollback processes earlier frames again, with the sensor",
+      policy->Fail("a rollback would process earlier frames again with the disabled sensor",
                    "skip or abort, or another out_of_sequence.policy");
     }
   }
@@ -313,7 +318,7 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
     RefuseSingleMatches(entry, spec.problem);
   }
   if (streams != nullptr) CheckStreams(merged.root(), spec.problem, *streams);
-  // Landmarks are initialised at the same frames as in the other estimator.
+  // This estimator must initialise each landmark at the same frame as the other estimator.
   const bool uses_accepted = use && use->is_map();
   if (uses_accepted && spec.problem.landmarks) {
     LandmarkOptions& landmarks = *spec.problem.landmarks;

@@ -6,7 +6,7 @@
 namespace alidade::internal {
 namespace {
 
-/// Marks all keys below `map` as read, as no model has to read every key of a calibration.
+/// Marks all keys below `map` as read, because no model has to read every key of a calibration.
 void MarkAsRead(const Node& map) {
   for (const auto& [key, value] : map.Entries()) {
     if (value.is_map()) MarkAsRead(value);
@@ -18,7 +18,7 @@ void MarkAsRead(const Node& map) {
 Config WithCalibration(const Config& config, const Source& source) {
   const Node root = config.root();
   if (const auto node = root.Find("calibration")) {
-    node->Fail("not a key of a config: the data provide the calibration", "'camera'");
+    node->Fail("a config cannot contain this key: the data provide the calibration", "'camera'");
   }
   const auto use = root.At("source").Find("calibration");
   if (use && use->Choice({"use", "ignore"}) == 1) return config;

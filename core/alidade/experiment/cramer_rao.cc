@@ -13,8 +13,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns the problem of the optimal filter: without losses, with Jacobians at the state, and with
-/// updates of all roles.
+/// Returns the problem of the optimal filter: it has no losses, evaluates all Jacobians at the
+/// state, and updates all roles.
 Problem IdealProblem(Problem problem) {
   for (SensorBinding& sensor : problem.sensors) {
     sensor.loss = {};
@@ -34,7 +34,7 @@ bool HasFailedMeasurement(const UpdateReport& report) {
   });
 }
 
-/// Returns why landmarks of `sensor` cannot start at truth, or "" if they can.
+/// Returns the reason why landmarks of `sensor` cannot start at truth, or "" if they can.
 std::string WhyNotAtTruth(const SensorBinding& sensor) {
   const auto representation = RepresentationOf(sensor.model->roles());
   const std::string name = '\'' + sensor.name + '\'';
@@ -45,13 +45,13 @@ std::string WhyNotAtTruth(const SensorBinding& sensor) {
   return "";
 }
 
-/// Returns why a problem with landmarks has no bound, or "".
+/// Returns the reason why a problem with landmarks has no bound, or "" if it has one.
 std::string WhyNoMap(const Problem& problem) {
   for (std::size_t i = 0; i < problem.sensors.size(); ++i) {
     const SensorBinding& sensor = problem.sensors[i];
     for (std::size_t k = 0; k < i; ++k) {
       if (problem.sensors[k].stream != sensor.stream) continue;
-      return '\'' + problem.sensors[k].name + "' and '" + sensor.name + "' share a stream";
+      return '\'' + problem.sensors[k].name + "' and '" + sensor.name + "' use the same stream";
     }
     if (!sensor.model->has_landmark()) continue;
     if (std::string why = WhyNotAtTruth(sensor); !why.empty()) return why;
@@ -59,13 +59,13 @@ std::string WhyNoMap(const Problem& problem) {
   return "";
 }
 
-/// Returns the ID of a block `landmarks.ID.role#N`.
+/// Returns the ID in the name of a landmark block, `landmarks.ID.role#N`.
 std::int64_t LandmarkOf(const Block& block) {
   return std::stoll(block.name.substr(block.owner.size() + 1));
 }
 
-/// Returns the values of a landmark at p in the representation of the roles, anchored one metre
-/// before it along z. Its measurements do not depend on the anchor.
+/// Returns the values of a landmark at p in the given representation. The anchor is one metre from
+/// p, at lower z. Measurements of the landmark do not depend on the anchor.
 std::vector<double> LandmarkValues(LandmarkRepresentation representation,
                                    const std::array<double, 3>& p) {
   return WithRepresentation(representation, [&](auto representation_type) {
@@ -133,9 +133,9 @@ bool CramerRaoBound::Add(const SourceFrame& frame) {
   return !is_lost_;
 }
 
-/// Replaces each valid measurement of the frame by its prediction at truth. A measurement with an
-/// invalid prediction stays unchanged, and `has_all` becomes false. Returns false if a landmark has
-/// no truth.
+/// Replaces each valid measurement of the frame by its prediction at truth. If a prediction is
+/// invalid, leaves the measurement unchanged and sets `has_all` to false. Returns false if a
+/// landmark has no truth.
 bool CramerRaoBound::ReplaceByPrediction(Frame& frame, bool& has_all) const {
   const FilterState& f = engine_.f;
   for (Measurement& measurement : frame.measurements) {
@@ -175,7 +175,7 @@ bool CramerRaoBound::ReplaceByPrediction(Frame& frame, bool& has_all) const {
   return true;
 }
 
-/// Returns false if the truth of a block with a covariance is unknown.
+/// Sets the state to truth. Returns false if the truth of a block with a covariance is unknown.
 bool CramerRaoBound::MoveToTruth(const Truth& truth) {
   State& state = engine_.f.state;
   std::vector<double> values = state.values();
@@ -191,8 +191,8 @@ bool CramerRaoBound::MoveToTruth(const Truth& truth) {
   return true;
 }
 
-/// Returns the true value of a landmark block that is new in this frame. The anchors of the frame
-/// must be equal, because a block does not identify its anchor.
+/// Returns the true value of a landmark block that is new in this frame. Returns nullopt if the
+/// anchors of this frame differ, because a block does not identify its anchor.
 std::optional<std::vector<double>> CramerRaoBound::TrueValue(
     const Block& block, const double* value, std::span<const Block* const> anchors) const {
   const auto position = true_landmark_(LandmarkOf(block));
@@ -204,7 +204,7 @@ std::optional<std::vector<double>> CramerRaoBound::TrueValue(
   if (is_anchored && anchors.empty()) return {};
   const double* origin = is_anchored ? landmarks_.at(anchors.front()->name).data() : value;
   const Eigen::Map<const Eigen::Vector3d> a(origin), p(position->data());
-  constexpr double kSame = 1e-9;  // m, difference of equal anchors by rounding
+  constexpr double kSame = 1e-9;  // m, largest difference of equal anchors due to rounding
   for (const Block* anchor : anchors) {
     if (!((a - Eigen::Map<const Eigen::Vector3d>(landmarks_.at(anchor->name).data())).norm() <
           kSame)) {
@@ -221,7 +221,8 @@ std::optional<std::vector<double>> CramerRaoBound::TrueValue(
   return y;
 }
 
-/// Returns false if the true position of a landmark is unknown.
+/// Sets the landmark blocks in `values` to truth. Returns false if the true position of a landmark
+/// is unknown.
 bool CramerRaoBound::MoveLandmarks(std::vector<double>& values) {
   const std::vector<Block>& blocks = engine_.f.state.layout().blocks();
   std::map<std::string, std::vector<double>> present;

@@ -9,7 +9,8 @@ namespace {
 
 std::string NameInEntry(const Block& block) { return block.name.substr(block.owner.size() + 1); }
 
-/// Returns the item `block` of the list `consider` of its state entry.
+/// Returns the item of the list `consider` that names `block`. `state` is the state entry of the
+/// block.
 Node FindConsiderItem(const Node& state, const Block& block) {
   const Node list = state.At("consider");
   for (const Node& item : list.Items()) {
@@ -24,7 +25,8 @@ Node FindDefectNode(const ProblemDefect& defect, const Node& root, const Problem
   if (defect.block >= 0) {
     const Block& block = problem.layout[defect.block];
     const auto entry = root.At("state").Find(block.owner);
-    const Node state = entry ? *entry : root.At("sensors").At(block.owner);  // the sensor owns it
+    // A sensor owns the block.
+    const Node state = entry ? *entry : root.At("sensors").At(block.owner);
     if (defect.key == std::string_view("consider")) return FindConsiderItem(state, block);
     return state.At("initial").At(NameInEntry(block)).At(defect.key);
   }
@@ -32,7 +34,7 @@ Node FindDefectNode(const ProblemDefect& defect, const Node& root, const Problem
   const SensorBinding& sensor = problem.sensors[static_cast<std::size_t>(defect.sensor)];
   const Node roles = root.At("sensors").At(sensor.name).At("roles");
   const auto role = roles.Find(sensor.model->roles()[static_cast<std::size_t>(defect.role)].name);
-  if (!role) return roles;  // a role added by a time offset
+  if (!role) return roles;  // a time offset added the role
   return role->At(defect.key);
 }
 

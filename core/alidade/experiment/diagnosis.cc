@@ -12,7 +12,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Adds an event `unit` for each sensor whose measurements are far from all its predictions.
+/// Adds an event `unit` for each sensor whose measurements may have the wrong unit
+/// (Metrics::far_off_sensors).
 void AddUnitEvents(const Problem& problem, const Metrics& metrics, EstimatorResult& result) {
   for (const int index : metrics.far_off_sensors()) {
     const SensorBinding& sensor = problem.sensors[static_cast<std::size_t>(index)];
@@ -52,16 +53,17 @@ void AddConsistencyEvents(EstimatorResult& result) {
   add_events(EventKind::kNisBounds, "nis", "NIS", "sensor ");
 }
 
-/// Adds an event `truth` if no frame had the truth that the source declares.
+/// Adds an event `truth` if no frame contained a truth that the source declares.
 void AddTruthEvent(const Metrics& metrics, EstimatorResult& result) {
   const std::vector<std::string> names = metrics.blocks_without_truth();
   if (names.empty()) return;
   result.events.push_back({kNoTimestamp, EventKind::kTruth,
-                           "no frame has the truth of " + Join(names) +
+                           "no frame contains the truth of " + Join(names) +
                                "; do its times match those of the measurements?"});
 }
 
-/// Adds an event `unused` for each sensor without a used measurement in the whole run.
+/// Adds an event `unused` for each sensor of which the estimator used no measurement in the whole
+/// run.
 void AddUnusedEvents(const Problem& problem, EstimatorResult& result) {
   for (const SensorBinding& sensor : problem.sensors) {
     std::int64_t used_count = 0, total = 0;

@@ -22,9 +22,10 @@ EkfOptions ReadCommon(Params& p) {
       p.NumberOrNone("gate", "", "probability that the gate accepts a consistent measurement",
                      {0.0, 1.0, true, true})
           .value_or(options.gate);
-  options.fuse = static_cast<Fuse>(p.Choice("fuse", {"joint", "per_sensor", "per_measurement"},
-                                            "how the measurements of one timestamp form updates",
-                                            static_cast<int>(options.fuse)));
+  options.fuse =
+      static_cast<Fuse>(p.Choice("fuse", {"joint", "per_sensor", "per_measurement"},
+                                 "how the measurements of one timestamp are grouped into updates",
+                                 static_cast<int>(options.fuse)));
   options.max_dt_s =
       p.NumberOrNone("max_dt_s", "s", "longer gaps are divided into equal steps", kPositive)
           .value_or(options.max_dt_s);
@@ -74,10 +75,11 @@ UkfOptions ReadUkf(Params& p) {
   options.alpha = p.Number("alpha", "", "spread of the sigma points",
                            {UkfOptions::kMinAlpha, 1.0, false, false}, options.alpha);
   options.beta = p.NonNegative(
-      "beta", "", "added covariance weight of the centre point; 2 is optimal for a Gaussian",
+      "beta", "", "weight added to the centre point in covariances; 2 is optimal for a Gaussian",
       options.beta);
   options.kappa = p.NonNegative(
-      "kappa", "", "added to the number of dimensions in the spread of the points", options.kappa);
+      "kappa", "", "added to the dimension in the formula for the spread of the points",
+      options.kappa);
   options.filter = ReadCommon(p);
   return options;
 }
@@ -100,8 +102,8 @@ Description DescribeUkf(const UkfOptions& options) {
                                       ", " + NumberText(options.kappa)}}};
 }
 
-/// Returns a type with options that `read` reads and `describe` describes. A missing key has its
-/// default.
+/// Returns an estimator type. `read` reads its options, and `describe` describes them. A missing
+/// key has its default value.
 template <class Filter, class Options>
 EstimatorType MakeType(const char* name, const char* doc, Options (*read)(Params&),
                        Description (*describe)(const Options&),

@@ -13,7 +13,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns the frame without the streams that only failed sensors read; `failed` is by sensor.
+/// Returns the frame without the streams that only failed sensors read. `failed` has an element for
+/// each sensor.
 Frame WithoutFailedStreams(const Frame& frame, const std::vector<StreamInfo>& streams,
                            const Problem& problem, const std::vector<char>& failed) {
   const auto is_visible = [&](const Measurement& m) {
@@ -24,7 +25,7 @@ Frame WithoutFailedStreams(const Frame& frame, const std::vector<StreamInfo>& st
       is_read = true;
       has_working_sensor = has_working_sensor || failed[s] == 0;
     }
-    return has_working_sensor || !is_read;  // it may be a control input
+    return has_working_sensor || !is_read;  // an unread stream may be a control input
   };
   Frame visible{frame.timestamp, {}};
   std::ranges::copy_if(frame.measurements, std::back_inserter(visible.measurements), is_visible);
@@ -103,7 +104,7 @@ void EstimatorRun::AddEvents(const std::vector<Event>& events) {
 
 namespace {
 
-/// Returns the result before the first frame.
+/// Returns the result of an estimator before the first frame.
 EstimatorResult InitialResult(const EstimatorSpec& spec, const Experiment& experiment) {
   EstimatorResult result;
   result.name = spec.name;

@@ -61,8 +61,8 @@ std::vector<Segment> ReadSegments(const Node& root, const Problem& problem,
   return segments;
 }
 
-/// Rejects a truth of the config that matches neither a block of `full_problem`, which has all
-/// sensors, nor a block of an estimator.
+/// Rejects a truth in the config that does not match any block of `full_problem` or of an
+/// estimator. `full_problem` has all sensors.
 void CheckTruths(const Node& source, const Experiment& experiment, const Problem& full_problem) {
   const auto listed = source.Find("truth");
   if (!listed || !listed->is_map()) return;
@@ -106,8 +106,8 @@ OutOfSequencePolicy ReadOutOfSequence(const Node& root) {
   return policy;
 }
 
-/// Returns the rank of each stream: the index of the first sensor that reads it, or the number of
-/// sensors.
+/// Returns the rank of each stream: the index of the first sensor that reads the stream, or the
+/// number of sensors if no sensor does.
 std::vector<int> RanksOf(const std::vector<StreamInfo>& streams, const Problem& problem) {
   std::vector<int> ranks;
   for (const StreamInfo& stream : streams) {
@@ -173,19 +173,20 @@ const Filter* ReadGuide(const Node& source, const Experiment& experiment) {
   return filter;
 }
 
-/// Declares the keys of the root that are read before the calibration, or by other commands.
+/// Declares the keys of the root that were read before the calibration was added, or that other
+/// commands read.
 void DeclareCommon(const Node& root) {
   for (const char* key :
        {"alidade", "plugins", "include", "title", "output", "source", "out_of_sequence"}) {
     root.Declare(key);
   }
-  // The calibration of a pair has a baseline, also if only one camera is used.
+  // The calibration of a stereo pair contains a baseline, even if the sensors use only one camera.
   if (const auto camera = root.Find("camera")) camera->Declare("baseline_m");
 }
 
-/// Reads `evaluate.truth_sigma`: for each truth of the source the standard deviation of its
-/// elements. Returns an empty list if the key is missing. Errors: kBadConfig for an unknown truth,
-/// a number below 0, or a `reference` that is not truth.
+/// Reads `evaluate.truth_sigma`: the standard deviation of the elements of each truth of the
+/// source. Returns an empty list if the key is missing. Errors: kBadConfig for an unknown truth, a
+/// number below 0, or a `reference` that is not truth.
 std::vector<double> ReadTruthSigmas(const Node& root, const std::vector<StreamInfo>& truths,
                                     bool is_truth_reference) {
   const auto evaluate = root.Find("evaluate");
@@ -235,7 +236,8 @@ std::vector<std::filesystem::path> PluginPaths(const Config& config) {
 }
 
 std::set<std::string> KeysAndScalarsOf(const Config& config) {
-  const Config copy = config.Copy();  // so that no key of the original counts as read
+  // A copy, so reading it does not mark keys of the original as read.
+  const Config copy = config.Copy();
   std::set<std::string> words;
   AddKeysAndScalars(copy.root(), words);
   return words;
@@ -261,7 +263,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   DeclareCommon(root);
   const std::vector<StreamInfo>& streams = experiment.source->streams();
 
-  // Every sensor is checked, whether or not an estimator uses it.
+  // Check every sensor, even if no estimator uses it.
   const Problem full_problem = ReadProblem(root, host, {});
   internal::CheckStreams(root, full_problem, streams);
   experiment.out_of_sequence.ranks = RanksOf(streams, full_problem);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kCountedDefect = 1e-9;
 
-/// `unit quaternion`, as in a sentence.
+/// Returns the name of a geometry for a sentence, such as `unit quaternion`.
 std::string SpacedName(const Geometry& geometry) {
   std::string name = geometry.name();
   std::ranges::replace(name, '_', ' ');
@@ -31,7 +31,8 @@ void CheckSize(const Frame& frame, const StreamInfo& info, const std::vector<dou
                     std::to_string(info.size) + ',');
 }
 
-/// Returns the geometry of a stream in the models of the experiment, or a vector.
+/// Returns the geometry that the models of the experiment assign to a stream; a vector if no model
+/// reads the stream.
 Geometry GeometryOf(const Experiment& experiment, const StreamInfo& stream) {
   for (const EstimatorSpec& spec : experiment.estimators) {
     for (const SensorBinding& sensor : spec.problem.sensors) {
@@ -111,7 +112,7 @@ void FrameCheck::Normalise(Channel& channel, std::vector<double>& value) {
       throw Error(ExitCode::kBadData, ErrorLine(source_.place(), channel.info.name,
                                                 "the length of a " + SpacedName(part) +
                                                     " is off by " + RoundedText(defect, 4),
-                                                "unit length to 1e-3"));
+                                                "a length within 1e-3 of 1"));
     }
     if (defect > kCountedDefect) ++normalised_[channel.info.name];
     part.Normalise(x);

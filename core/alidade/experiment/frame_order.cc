@@ -15,7 +15,7 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns `; the first is in FILE:LINE`, or "" if the place is unknown.
+/// Returns the text `; the first is in FILE:LINE`, or "" if the place is unknown.
 std::string FirstPlaceText(const Place& place) {
   const std::string text = ToString(Place{place.file, place.line, 0});
   return text.empty() ? "" : "; the first is in " + text;
@@ -71,13 +71,14 @@ const ProcessedFrame* FrameOrder::processed(std::size_t estimator) const {
   return &snapshots_[estimator]->released();
 }
 
-/// Returns whether a frame with this timestamp would arrive too late now.
+/// Returns whether a frame with this timestamp would be older than the window allows if it arrived
+/// now.
 bool FrameOrder::IsTooLate(Timestamp timestamp) const {
   return experiment_.out_of_sequence.window &&
          Lag(newest_, timestamp) > *experiment_.out_of_sequence.window;
 }
 
-/// Counts the frame. Returns false if it must be dropped.
+/// Counts the frame in the statistics. Returns false if the frame must be dropped.
 bool FrameOrder::Accept(const Frame& frame) {
   if (frame.timestamp >= newest_) {
     newest_ = frame.timestamp;
@@ -90,7 +91,7 @@ bool FrameOrder::Accept(const Frame& frame) {
   ++arrivals_.dropped;
   events_.push_back({frame.timestamp, EventKind::kOutOfSequence,
                      "a frame " + StreamNames(frame) + "was dropped: it is " + SecondsText(lag) +
-                         " older than the newest, beyond the window of " +
+                         " older than the newest frame, but the window is " +
                          SecondsText(*experiment_.out_of_sequence.window)});
   return false;
 }
@@ -105,7 +106,7 @@ std::string FrameOrder::StreamNames(const Frame& frame) const {
   return names.empty() ? "" : "of " + Join(names) + ' ';
 }
 
-/// Reads a frame from the source into the buffer.
+/// Reads one frame from the source and inserts it into the buffer.
 void FrameOrder::Receive() {
   BufferedFrame received;
   is_at_end_ = !experiment_.source->Next(received.frame);
@@ -118,12 +119,12 @@ void FrameOrder::Receive() {
   try {
     Replay(index);
   } catch (...) {
-    buffer_.resize(index);  // the frames before it are unchanged
+    buffer_.resize(index);  // the results of earlier frames are still valid
     throw;
   }
 }
 
-/// Inserts the frame into buffer_ and returns its index.
+/// Inserts the frame into buffer_, or merges it into a buffered frame. Returns the index.
 std::size_t FrameOrder::Insert(BufferedFrame&& received) {
   const auto timestamp = [](const BufferedFrame& buffered) { return buffered.frame.timestamp; };
   const auto next = std::ranges::lower_bound(buffer_, received.frame.timestamp, {}, timestamp);
@@ -138,7 +139,8 @@ std::size_t FrameOrder::Insert(BufferedFrame&& received) {
   return index;
 }
 
-/// Throws if both frames have a measurement of the same stream, or different values of a truth.
+/// Throws if both frames contain a measurement of the same stream, or different values of the same
+/// truth.
 void FrameOrder::CheckMerge(const BufferedFrame& buffered, const SourceFrame& part) const {
   const Source& source = *experiment_.source;
   const SourceFrame& merged = buffered.frame;
@@ -166,7 +168,7 @@ void FrameOrder::CheckMerge(const BufferedFrame& buffered, const SourceFrame& pa
 }
 
 /// Merges the measurements of both frames in the order of the config. Adds the truths that the
-/// buffered frame does not have.
+/// buffered frame lacks.
 void FrameOrder::Merge(BufferedFrame& buffered, BufferedFrame&& received) const {
   SourceFrame &merged = buffered.frame, &part = received.frame;
   const auto key = [this](const Measurement& measurement) {
@@ -193,7 +195,8 @@ void FrameOrder::Merge(BufferedFrame& buffered, BufferedFrame&& received) const 
   }
 }
 
-/// Processes the buffered frames from index `first` on again, after the earlier frames.
+/// Rolls each estimator back to the frame before index `first`, and processes the buffered frames
+/// from `first` on again.
 void FrameOrder::Replay(std::size_t first) {
   for (std::size_t e = 0; e < experiment_.estimators.size(); ++e) {
     if (!snapshots_[e]) continue;

@@ -28,8 +28,9 @@ bool IsScalar(const SensorBinding& binding) {
          std::ranges::all_of(binding.model->roles(), is_scalar);
 }
 
-/// Solves h(x) = z for the first role by Newton's method from its value, with the other roles
-/// unchanged; all are scalars. Returns nothing if that does not converge.
+/// Solves h(x) = z for the first role by Newton's method, starting from the given value of that
+/// role. The other roles do not change. All roles must be scalars. Returns nullopt if the iteration
+/// does not converge.
 std::optional<double> SolveForFirstRole(const SensorModel& model, std::vector<const double*> roles,
                                         double z) {
   constexpr int kMaxSteps = 20;
@@ -74,7 +75,7 @@ std::vector<const double*> RolesAtTruth(const Truth& truth, const std::vector<in
 
 std::optional<ImpliedState> ImpliedState::Of(const Problem& problem, const SensorBinding& binding,
                                              const std::vector<StreamInfo>& truths) {
-  if (binding.model->known_size() > 0) return {};  // x would depend on them
+  if (binding.model->known_size() > 0) return {};  // x would depend on the known numbers
   if (IsInvertible(problem, binding)) {
     const auto role = static_cast<std::size_t>(binding.model->inverse().role);
     return ImpliedState(binding.model, binding.roles[role].block);

@@ -43,7 +43,8 @@ std::vector<std::string> Keys(const RunResult& result, const Map EstimatorResult
   return keys;
 }
 
-/// A unit with an SI prefix that suits the size of the numbers, and the factor for the numbers.
+/// Unit with an SI prefix that suits the magnitude of the numbers, and the factor that converts the
+/// numbers to this unit.
 struct ScaledUnit {
   double factor = 1.0;
   std::string unit;
@@ -58,8 +59,8 @@ ScaledUnit ScaleUnit(const std::string& unit, double largest) {
 
 using Values = std::vector<std::optional<double>>;
 
-/// Returns cells with at least four significant digits, including all digits before the point.
-/// Magnitudes up to 1e-5 and from 1e7 are in scientific notation.
+/// Returns cells with at least four significant digits and all digits before the decimal point.
+/// Uses scientific notation for magnitudes up to 1e-5 and from 1e7.
 std::vector<std::string> Format(const Values& values) {
   constexpr double kSmall = 1e-5, kLarge = 1e7;
   const auto decimals = [](double v) {
@@ -100,8 +101,8 @@ Values ValuesOf(const RunResult& result, const std::string& key) {
   return values;
 }
 
-/// Returns the largest finite RMSE of all blocks with that unit, or without truth the largest
-/// difference. It determines one prefix for the whole table.
+/// Returns the largest finite RMSE of all blocks with this unit. If there is no truth, uses the
+/// RMSD instead. The result determines the common prefix of the whole table.
 double LargestRmse(const RunResult& result, const std::string& unit) {
   double largest = 0.0;
   for (const std::string& text : Keys(result, &EstimatorResult::metrics)) {
@@ -137,7 +138,8 @@ ScaledUnit ScaledUnitOf(const RunResult& result, const MetricKey& key) {
   return {};
 }
 
-/// Returns the row of a metric. Its label has `name`, the subject, the segment and the unit.
+/// Returns the row of a metric. The label consists of `name`, the subject, the segment and the
+/// unit.
 TableRow RowOf(const RunResult& result, const std::string& text, const std::string& name) {
   const MetricKey key = MetricKey::Parse(text);
   const ScaledUnit scaled = ScaledUnitOf(result, key);
@@ -152,11 +154,12 @@ TableRow RowOf(const RunResult& result, const std::string& text, const std::stri
   return {label, Format(values)};
 }
 
-/// Returns the name of a metric in a table, without the unit, which the label shows.
+/// Returns the name of a metric for a table. Omits the unit, because the label contains it in
+/// brackets.
 std::string ShownName(const std::string& name) { return name == "lag_ms" ? "lag" : name; }
 
-/// Returns true if the errors of the subject are zero in every estimator, as for a block that is
-/// fixed at its true value.
+/// Returns true if the errors of the subject are zero in every estimator, for example because a
+/// block is fixed at its true value.
 bool IsExact(const RunResult& result, const std::string& subject) {
   for (const char* name : {"rmse", "nees.mean"}) {
     const Values values = ValuesOf(result, MetricKey{name, subject, ""}.text());
@@ -221,7 +224,8 @@ int PriorityOf(const MetricKey& key) {
 /// Returns the keys of MainRows() without `diverged` and `inconsistent`. Each round chooses one
 /// subject of each metric.
 std::set<std::string> MainKeys(const RunResult& result, const std::vector<std::string>& subjects) {
-  std::map<int, std::vector<std::pair<std::size_t, std::string>>> by_priority;  // subject, key
+  // Index of the subject, key.
+  std::map<int, std::vector<std::pair<std::size_t, std::string>>> by_priority;
   const auto add = [&](const std::vector<std::string>& candidates, bool is_count) {
     for (const std::string& text : candidates) {
       const MetricKey key = MetricKey::Parse(text);
@@ -328,7 +332,7 @@ std::string ReferenceText(const RunResult& result) {
   if (!result.withheld.empty()) return result.withheld;
   if (result.reference == "truth") return "";
   return "errors are differences from estimator '" + result.reference +
-         "', an estimate itself: no coverage, no NEES";
+         "', which is not the truth: no coverage, no NEES";
 }
 
 }  // namespace internal

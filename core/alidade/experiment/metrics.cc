@@ -32,8 +32,9 @@ constexpr int kInconsistentTimestamps = 20;
 constexpr double kFarSigmas = 100.0;
 constexpr double kFarAngleSigmas = 5.0;
 
-/// Returns true if the innovation of an angle, which never exceeds pi, indicates another unit. It
-/// is then far beyond its sigma, and it exceeds pi / 4 or the measurement exceeds a turn.
+/// Returns true if the innovation of an angle, which never exceeds pi, indicates another unit. Such
+/// an innovation is far beyond its sigma, and either it exceeds pi / 4 or the measurement exceeds a
+/// full turn.
 bool IsFarAngle(const MeasurementReport& measurement) {
   if (!(measurement.nis > kFarAngleSigmas * kFarAngleSigmas)) return false;
   if (measurement.innovation.empty() || measurement.z.empty()) return false;
@@ -44,7 +45,7 @@ bool IsFarAngle(const MeasurementReport& measurement) {
 }  // namespace
 
 struct Metrics::Impl {
-  /// The samples of one metric of one subject.
+  /// Sums of the samples of one metric of one subject.
   struct Accumulator {
     double sum = 0.0, max = 0.0, last = 0.0;
     std::int64_t count = 0;
@@ -71,13 +72,13 @@ struct Metrics::Impl {
     }
   };
 
-  /// Accumulators of the sampled metrics over the whole run or one segment: for each entry of
-  /// kMetrics one accumulator per subject.
+  /// Accumulators of the sampled metrics over one period, which is the whole run or one segment.
+  /// Each entry of kMetrics has one accumulator for each subject.
   struct PeriodSums {
     std::string segment;  ///< "": the whole run
     std::array<std::vector<Accumulator>, kMetrics.size()> metrics;
 
-    /// Adds the sample of subject `index` to each metric that has this sample function.
+    /// Adds the sample of subject `index` to each metric that has a sample function of this kind.
     template <class Sample>
     void Add(std::optional<double> (*MetricInfo::*function)(const Sample&), std::size_t index,
              const Sample& sample) {
@@ -93,7 +94,7 @@ struct Metrics::Impl {
   };
 
   /// Estimate and truth of a scalar block over evenly spaced timestamps, for its lag. Retains only
-  /// the first kMaxSize values, which bounds memory and computing time.
+  /// the first kMaxSize values, to limit memory and computing time.
   struct LagSeries {
     static constexpr std::size_t kMaxSize = 100'000;
 
@@ -116,7 +117,7 @@ struct Metrics::Impl {
     double step_ms() const {
       return 1e-6 * static_cast<double>(last - first) / static_cast<double>(truth.size() - 1);
     }
-    /// Returns true if all steps are within 5 % of their mean, as for the clock of a camera.
+    /// Returns true if all time steps are within 5 % of their mean, as those of a camera are.
     bool is_even() const {
       if (truth.size() < 2 || shortest_step <= 0) return false;
       return 1e-6 * static_cast<double>(longest_step) < 1.05 * step_ms() &&
@@ -124,28 +125,30 @@ struct Metrics::Impl {
     }
   };
 
-  /// A block whose truth is known.
+  /// Block whose truth the source provides.
   struct TrackedBlock {
     BlockId id;
     std::size_t truth;  ///< index into the truths
     std::string name, unit;
     Geometry geometry;
     std::vector<std::string> elements;  ///< names of the tangent elements
-    /// Number of timestamps in a row beyond 10 sigma, by element; -1: the event is reported.
+    /// For each element, the number of timestamps in a row with an error above 10 sigma. -1 means
+    /// that the event was already reported.
     std::vector<int> outside_counts;
     bool is_scalar;
-    double truth_variance;  ///< of each element
-    LagSeries series;       ///< only of a scalar block
+    double truth_variance;  ///< variance of each element of the truth
+    LagSeries series;       ///< used only for a scalar block
     bool was_ever_known = false;
 
-    // At the current timestamp; `error` and `squared_error` are valid only if is_known.
+    // Values at the current timestamp. `error` and `squared_error` are valid only if `is_known` is
+    // true.
     bool is_known = false;
     Eigen::VectorXd error;
     double squared_error;
   };
 
-  /// Every n-th value of a series. The stride n grows so that there are fewer than kMaxSize values,
-  /// which bounds the cost of their autocorrelation.
+  /// Every n-th value of a series. The stride n grows so that fewer than kMaxSize values are
+  /// stored. This limits the cost of computing their autocorrelation.
   struct ThinnedSeries {
     static constexpr std::size_t kMaxSize = 10'000;
     std::vector<double> values;
@@ -161,7 +164,7 @@ struct Metrics::Impl {
     }
   };
 
-  /// The state that single measurements of a sensor imply. Its truth is known.
+  /// State that single measurements of a sensor imply. The source provides its truth.
   struct ImpliedBlock {
     internal::ImpliedState state;
     std::size_t truth;  ///< index into the truths
@@ -171,23 +174,24 @@ struct Metrics::Impl {
   struct Owner {
     std::string name;
     std::vector<std::size_t> blocks;  ///< indices into tracked_blocks
-    ThinnedSeries nees = {};          ///< per dof
+    ThinnedSeries nees = {};          ///< NEES divided by its dof
   };
 
-  /// Inputs to the NIS bounds of a sensor.
+  /// Data for the NIS bounds of a sensor.
   struct NisSamples {
     bool has_bounds = false;  ///< true if a filter without a robust loss provides the innovations
     int dof = 0;
     std::int64_t frames = 0, last_frame = -1;  ///< frames with an accepted measurement
-    double smallest_gated = kInfinity;         ///< the smallest NIS that was gated
+    double smallest_gated = kInfinity;         ///< smallest NIS of a gated measurement
   };
 
   std::vector<TrackedBlock> tracked_blocks;
   std::vector<Owner> owners;
-  std::vector<std::string> sensors, motions;   ///< names
+  std::vector<std::string> sensors, motions;   ///< names of both
   std::map<int, ImpliedBlock> implied_blocks;  ///< by sensor
   bool has_landmarks = false, has_ransac = false;
-  /// Number of accepted and gated measurements of a sensor, and how many of them are far off.
+  /// Number of accepted and gated measurements of a sensor, and the number of those that are far
+  /// off.
   struct FarOffCounts {
     std::int64_t total = 0, far_off = 0;
   };
@@ -196,7 +200,7 @@ struct Metrics::Impl {
   std::vector<NisSamples> nis_samples;       ///< by sensor
   std::int64_t report_count = 0;
   std::map<int, std::vector<double>> reprojection;  ///< rms of each frame, by sensor
-  std::vector<PeriodSums> periods;                  ///< the whole run, then the segments
+  std::vector<PeriodSums> periods;  ///< element 0 is the whole run; the segments follow
   /// Pointers into `counts`, by sensor and outcome; null before the first measurement.
   std::vector<std::array<std::int64_t*, kOutcomes.size()>> outcome_counts;
   std::map<std::string, std::int64_t> counts;
@@ -219,7 +223,7 @@ struct Metrics::Impl {
                const State& state);
   void AddReport(const std::vector<PeriodSums*>& destinations, const UpdateReport& report);
   void AddInnovation(std::size_t sensor, const MeasurementReport& measurement);
-  /// Returns the sums of the whole run, and of the segments that contain the frame.
+  /// Returns the accumulators of the whole run, and of each segment that contains the frame.
   std::vector<PeriodSums*> PeriodsOf(const std::vector<bool>& in_segment);
   const std::string& SubjectOf(const MetricInfo& metric, std::size_t index) const;
   void Write(const PeriodSums& sums, std::map<std::string, double>& metrics) const;
@@ -308,7 +312,7 @@ void Metrics::Impl::ComputeErrors(Timestamp timestamp, const Truth& truth,
         estimate != nullptr && block.truth < truth.size() && !truth[block.truth].empty();
     if (!block.is_known) continue;
     const double* const true_value = truth[block.truth].data();
-    // In the tangent space at the estimate, like P.
+    // The error is in the tangent space at the estimate, like P.
     block.geometry.Minus(true_value, estimate, block.error.data());
     block.squared_error = block.error.allFinite() ? block.error.squaredNorm() : kInfinity;
     block.was_ever_known = true;
@@ -319,7 +323,8 @@ void Metrics::Impl::ComputeErrors(Timestamp timestamp, const Truth& truth,
     if (!block.is_scalar) continue;
     double unwrapped = true_value[0];
     if (block.geometry.is_angle() && !block.series.truth.empty()) {
-      const double previous = block.series.truth.back();  // the lag needs a series without jumps
+      // The lag requires a series without jumps of 2 pi.
+      const double previous = block.series.truth.back();
       unwrapped = previous + Angle::Wrap(true_value[0] - previous);
     }
     block.series.Add(timestamp, unwrapped, block.error[0]);
@@ -331,7 +336,7 @@ void Metrics::Impl::CheckElement(Timestamp timestamp, TrackedBlock& block, int e
   int& outside_count = block.outside_counts[element];
   if (outside_count < 0) return;
   const double error = std::abs(block.error[element]);
-  // A sigma of zero belongs to a value that the filter assumes to be known.
+  // If sigma is zero, the filter assumes that the value is known.
   const bool is_inside = sigma == 0.0 || error <= kInconsistentSigmas * sigma;
   outside_count = is_inside ? 0 : outside_count + 1;
   if (outside_count < kInconsistentTimestamps) return;
@@ -345,7 +350,8 @@ void Metrics::Impl::CheckElement(Timestamp timestamp, TrackedBlock& block, int e
                         unit});
 }
 
-/// Adds the errors that ComputeErrors computed. `state` provides the covariance; null: unknown.
+/// Adds the errors that ComputeErrors computed. `state` provides the covariance; null means that
+/// the covariance is unknown.
 void Metrics::Impl::AddErrors(Timestamp timestamp, const std::vector<PeriodSums*>& destinations,
                               const State* state) {
   for (std::size_t i = 0; i < tracked_blocks.size(); ++i) {

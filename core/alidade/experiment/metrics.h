@@ -20,10 +20,11 @@ namespace alidade {
 /// the NEES is not computed there.
 ///
 /// The lag (see Lag()) is computed only for a scalar block whose truth changes and whose time steps
-/// lie within 5 % of their mean. It uses the first 100 000 timestamps. The bounds of the mean NEES allow for the correlation of the
-/// errors over time: n timestamps, at most 10 000, count as n / tau samples. tau is the integrated
-/// autocorrelation time of the NEES. Innovations are white, but those of one frame share the error
-/// of the prediction and count as one sample [BarShalom2001, sec. 5.4].
+/// lie within 5 % of their mean. It uses the first 100 000 timestamps. The bounds of the mean NEES
+/// allow for errors that are correlated over time: n timestamps, at most 10 000, count as n / tau
+/// samples. tau is the integrated autocorrelation time of the NEES. Innovations are white, but
+/// those of one frame share the error of the prediction and count as one sample [BarShalom2001,
+/// sec. 5.4].
 ///
 /// Counts are `OUTCOME:SENSOR`, `inputs:ENTRY` for control inputs, and for landmarks
 /// `landmarks.initialised`, `.deleted`, `.converted`, `.negative`, `.hypotheses`, `.rescued`.

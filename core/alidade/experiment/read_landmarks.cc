@@ -67,8 +67,8 @@ std::vector<KnownLandmark> ReadKnown(const Node& list) {
   return known;
 }
 
-/// Reads the map `outlier_rejection` of a sensor: `method: one_point_ransac`, and the members of
-/// OnePointRansac by their names.
+/// Reads the map `outlier_rejection` of a sensor: `method: one_point_ransac`, and one key for each
+/// member of OnePointRansac.
 OnePointRansac ReadOnePointRansac(const Node& node) {
   OnePointRansac ransac;
   static_cast<void>(node.At("method", "outlier_rejection").Choice({"one_point_ransac"}));
@@ -119,8 +119,8 @@ std::string RepresentationText(const SensorBinding& sensor) {
   return representation ? ToString(*representation) : "a custom representation";
 }
 
-/// Rejects a sensor that cannot share landmarks with `first_sensor`, or whose roles are not in
-/// order.
+/// Rejects a sensor whose landmark roles are not last, whose prior has several numbers, or whose
+/// landmark representation differs from that of `first_sensor`.
 void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBinding& first_sensor) {
   const auto is_landmark = [](const Space& role) { return role.landmark(); };
   if (!std::ranges::is_partitioned(sensor.model->roles(), std::not_fn(is_landmark))) {
@@ -142,7 +142,8 @@ void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBind
   }
 }
 
-/// Rejects a sensor without the position from which it observes landmarks, which `key` needs.
+/// Rejects `key` if the sensor has no role `position`, the position from which it observes
+/// landmarks.
 void CheckPosition(const Node& key, const SensorBinding& sensor) {
   if (std::ranges::find(sensor.model->roles(), "position", &Space::name) !=
       sensor.model->roles().end()) {
@@ -153,12 +154,12 @@ void CheckPosition(const Node& key, const SensorBinding& sensor) {
            "the key left out");
 }
 
-/// Rejects `options` that the sensor does not support.
+/// Rejects options that the sensor does not support.
 void CheckOptions(const Node& node, const LandmarkOptions& options, const SensorBinding& sensor) {
   const auto representation = RepresentationOf(sensor.model->roles());
   const std::string model = "model '" + sensor.model->name() + "' of sensor '" + sensor.name + "'";
   if (sensor.model->inverse().prior_size > 0 && !options.prior) {
-    node.Fail("no prior: " + model + " does not determine the distance of a landmark",
+    node.Fail("a prior is missing: " + model + " does not determine the distance of a landmark",
               "prior: {inverse_distance: ..., sigma: ...}");
   }
   if (options.prior) {
@@ -166,7 +167,8 @@ void CheckOptions(const Node& node, const LandmarkOptions& options, const Sensor
     if (representation == internal::XyzRepresentation() && sensor.model->inverse().prior_size > 0 &&
         !(options.prior->inverse_distance > 0.0)) {
       prior.At("inverse_distance")
-          .Fail("a landmark at infinity cannot be xyz", "a value above 0, 1/m");
+          .Fail("a landmark at infinity cannot have the representation xyz",
+                "a value above 0, 1/m");
     }
     if (options.prior->adapt_after > 0) CheckPosition(prior.At("adapt_after"), sensor);
   }
@@ -193,7 +195,7 @@ void internal::ReadLandmarkKeys(const std::string& name, const Node& entry,
                                 SensorOptions& options) {
   const Node role = entry.At("roles").At("landmark", "sensor '" + name + "'");
   if (role.is_map() || role.Text() != "landmarks") {
-    role.Fail("not `landmarks`", "`landmarks`, for the landmark that a measurement names");
+    role.Fail("not `landmarks`", "`landmarks`: each measurement names its landmark");
   }
   if (const auto node = entry.Find("outlier_rejection")) {
     options.outlier_rejection = ReadOnePointRansac(*node);

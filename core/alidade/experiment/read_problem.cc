@@ -22,7 +22,7 @@ namespace {
 
 using internal::NamesOf;
 
-/// Calls `add`, and rethrows its errors with the place of the entry.
+/// Calls `add`. If `add` throws, throws the error again with the place of the entry.
 template <class Add>
 void AddAt(const Node& entry, const Add& add) {
   try {
@@ -32,8 +32,8 @@ void AddAt(const Node& entry, const Add& add) {
   }
 }
 
-/// Reads the value of a block: a number, a list, or {w: , x: , y: , z: } for a unit
-/// quaternion, whose elements have no order that all programs share.
+/// Reads the value of a block: a number, a list, or {w: , x: , y: , z: } for a unit quaternion. A
+/// quaternion cannot be a list, because programs disagree about the order of its elements.
 std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   std::vector<double> mean;
   const bool double_cover = geometry.row().double_cover;
@@ -46,7 +46,7 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
     mean = node.Numbers(geometry.ambient);
   }
   if (DistanceFrom(geometry, mean.data()) > kUnitTolerance) {
-    node.Fail("not of unit length", "a unit vector or quaternion to 1e-3");
+    node.Fail("not of unit length", "a length within 1e-3 of 1");
   }
   if (double_cover) internal::ChooseSign({}, mean);
   return mean;
@@ -92,7 +92,8 @@ bool Contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// Reads the names of the blocks, renamed by the entry, in the order of the model.
+/// Returns the names of the blocks in the order of the model. Replaces those that the entry
+/// renames.
 std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& model) {
   std::vector<std::string> names = NamesOf(model.blocks());
   const auto renamed = entry.Find("blocks");
@@ -112,7 +113,8 @@ std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& mo
   return names;
 }
 
-/// Reads the initial value of the block `name` of the problem, which is `space` of the model.
+/// Reads the initial value of the block `name` of the problem. `space` describes the block in the
+/// model.
 InitialValue ReadInitial(const Node& initial, const Space& space, const std::string& name,
                          BlockStatus status) {
   InitialValue value = InitialValue::Constant(space.name, {});
@@ -205,8 +207,8 @@ std::vector<double> ReadSqrtDiagonal(const Node& node, int size) {
   return root;
 }
 
-/// Reads `constant`, {random_walk: sigma after one second} or
-/// {gauss_markov: {sigma, time_constant_s}}, with sigma of the stationary process.
+/// Reads `constant`, {random_walk: SIGMA} or {gauss_markov: {sigma, time_constant_s}}. The sigma of
+/// a random walk is the one after one second; that of a Gauss-Markov process is the stationary one.
 void ReadDynamics(const Node& node, int size, OwnedRole& owned) {
   owned.dynamics = OwnedDynamics::kConstant;
   owned.sqrt_density.clear();
@@ -260,7 +262,7 @@ class OwnedStateReader {
     dynamics_ = entry.Find("dynamics");
   }
 
-  /// Reads the state of a role. `owned` has the defaults of the model.
+  /// Reads the state of a role. `owned` contains the default values of the model.
   OwnedState Read(const Space& role, const OwnedRole& owned, const Problem& problem) {
     const auto has_name = [&](const Block& block) { return block.owner == name_; };
     if (!std::exchange(has_read_state_, true) &&
@@ -278,8 +280,9 @@ class OwnedStateReader {
         Contains(constant_, role.name) || (!initial && owned.sqrt_prior.empty());
     if (is_considered && is_constant) {
       entry_.At("consider")
-          .Fail("'" + role.name + "' is constant: it has no uncertainty",
-                "`initial` with a sigma, and `constant` without it");
+          .Fail(
+              "'" + role.name + "' cannot also be constant, because a constant has no uncertainty",
+              "`initial` with a sigma, and `constant` without it");
     }
     OwnedState state = OwnedState::Of(owned);
     state.initial.status = is_constant     ? BlockStatus::kConstant
@@ -321,7 +324,7 @@ class OwnedStateReader {
   }
 
  private:
-  /// Rejects an offset that is longer than a filter can predict.
+  /// Rejects an offset over which a filter cannot predict.
   void CheckOffset(const InitialValue& offset) const {
     constexpr double kMaxSeconds = 60.0;
     const double sigma = offset.covariance.size() == 0 ? 0.0 : std::sqrt(offset.covariance(0, 0));
@@ -399,7 +402,7 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
   std::vector<RoleBinding> bindings;
   for (std::size_t i = 0; i < model->roles().size(); ++i) {
     const Space& role = model->roles()[i];
-    if (role.landmark()) break;  // all remaining roles are landmark roles
+    if (role.landmark()) break;  // all remaining roles belong to the landmark
     const auto node = roles.Find(role.name);
     const bool is_owned = !node && (role.flags & ALIDADE_ROLE_OWNED) != 0;
     if (is_owned) options.owned.emplace(i, owned_states.Read(role, model->owned(i), problem));
@@ -489,7 +492,7 @@ Problem ReadProblem(const Node& root, const PluginHost& host,
     ReadSensor(name, entry, host, problem);
   }
   problem.landmarks = internal::ReadLandmarks(root, problem.sensors);
-  constexpr double kMaxInitialTime = 4.6e9;  // two timestamps may differ by twice that
+  constexpr double kMaxInitialTime = 4.6e9;  // two timestamps may differ by twice this limit
   if (const auto start = root.Find("initial_time_s"))
     problem.initial_time_s = start->Number(-kMaxInitialTime, kMaxInitialTime);
   if (!sensor_names.empty()) problem = SelectSensors(std::move(problem), sensor_names);

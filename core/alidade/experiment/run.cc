@@ -23,8 +23,8 @@ std::string TimeText(const Frame& frame) {
   return " at t = " + internal::SecondsText(frame.timestamp);
 }
 
-/// Returns whether the frame belongs to the segment: whether it has a valid measurement of the
-/// sensor of the segment, or does not have one, as the segment requires.
+/// Returns whether the frame belongs to the segment. Depending on the segment, the frame must, or
+/// must not, contain a valid measurement of the segment's sensor.
 bool IsInSegment(const Segment& segment, const Frame& frame) {
   const auto is_valid = [&](const Measurement& m) {
     return m.stream == segment.stream &&
@@ -48,8 +48,8 @@ void Fail(RunResult& result, ExitCode code, std::string reason) {
   result.reason = std::move(reason);
 }
 
-/// Returns the text of the event of the divergence or failure, else of the last event, else
-/// `fallback`.
+/// Returns the text of the event that reports a divergence or failure. If there is no such event,
+/// returns the text of the last event, or `fallback` if there are no events.
 std::string Cause(const std::vector<Event>& events, const char* fallback) {
   const auto cause = std::ranges::find(events, true, &Event::divergence);
   if (cause != events.end()) return cause->text;
@@ -57,8 +57,8 @@ std::string Cause(const std::vector<Event>& events, const char* fallback) {
 }
 
 /// Processes one frame with one estimator. `visible` is the frame with the measurements that the
-/// estimator uses. `rolled_back` is its result if it processed the frame on arrival, else null.
-/// Returns false if the whole run must end.
+/// estimator uses. If the estimator processed the frame on arrival, `rolled_back` is the result;
+/// otherwise it is null. Returns false if the whole run must end.
 bool Advance(EstimatorRun& run, const FrameWithSegments& frame, const Frame& visible,
              const ProcessedFrame* rolled_back, const Source& source, const RunOptions& options,
              RunResult& result) {
@@ -97,8 +97,8 @@ bool Advance(EstimatorRun& run, const FrameWithSegments& frame, const Frame& vis
   return !ends_run;
 }
 
-/// Returns the frame with the measurements that the estimator with this index accepted. It must
-/// have processed the frame.
+/// Returns the frame with the measurements that the estimator with index `estimator` accepted. This
+/// estimator must already have processed the frame.
 Frame AcceptedBy(int estimator, const std::vector<EstimatorRun>& runs, const Frame& frame,
                  const Source& source) {
   const EstimatorRun& filter = runs[static_cast<std::size_t>(estimator)];
@@ -108,8 +108,8 @@ Frame AcceptedBy(int estimator, const std::vector<EstimatorRun>& runs, const Fra
       filter.spec.problem, filter.last_report ? *filter.last_report : UpdateReport());
 }
 
-/// Reads the next frame according to the OutOfSequencePolicy; returns false at the end. Records the
-/// arrivals and events of other frames.
+/// Reads the next frame in the order of the OutOfSequencePolicy. Returns false at the end. Records
+/// the statistics of arrival and the events of dropped frames.
 bool NextFrame(internal::FrameOrder& frames, std::vector<EstimatorRun>& runs, RunResult& result,
                SourceFrame& frame) {
   const auto record = [&] {
@@ -127,8 +127,8 @@ bool NextFrame(internal::FrameOrder& frames, std::vector<EstimatorRun>& runs, Ru
   }
 }
 
-/// Processes the frames one by one with all estimators. Adds them to `stored` if an estimator is
-/// offline, or if metrics need the estimates of the reference.
+/// Processes the frames one by one with all estimators. Adds the frames to `stored` if an estimator
+/// is offline, or if metrics need the estimates of the reference.
 void RunFrames(Experiment& experiment, std::vector<EstimatorRun>& runs, const RunOptions& options,
                RunResult& result, std::vector<FrameWithSegments>& stored) {
   FrameWithSegments frame;
@@ -170,8 +170,8 @@ void RunFrames(Experiment& experiment, std::vector<EstimatorRun>& runs, const Ru
   }
 }
 
-/// Computes the metrics of an estimator. If that fails, for example for lack of memory, the other
-/// results remain.
+/// Computes the metrics of an estimator. If the computation fails, for example for lack of memory,
+/// the other results remain valid.
 void ComputeMetrics(EstimatorRun& run, RunResult& result) {
   try {
     run.result.metrics = run.metrics.Finish();
@@ -181,7 +181,8 @@ void ComputeMetrics(EstimatorRun& run, RunResult& result) {
   }
 }
 
-/// Records that the smoothing of an estimator was stopped. The results of the others remain.
+/// Records that the smoothing of an estimator was stopped. The results of the other estimators
+/// remain valid.
 void RecordStop(EstimatorRun& run, const char* reason, RunResult& result) {
   run.AddEvents({{run.spec.estimator->timestamp(), EventKind::kStopped, reason}});
   if (result.status != RunStatus::kOk) return;
@@ -197,7 +198,7 @@ void SmoothAll(std::vector<EstimatorRun>& runs, const std::vector<FrameWithSegme
     Estimator& estimator = *run.spec.estimator;
     if (run.finished || !estimator.offline()) continue;
     std::vector<Event> events;
-    auto start = Clock::now();  // of the time without records and metrics
+    auto start = Clock::now();  // start of the time measurement, which excludes records and metrics
     try {
       estimator.StopWhen(options.stop);
       estimator.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
@@ -213,7 +214,8 @@ void SmoothAll(std::vector<EstimatorRun>& runs, const std::vector<FrameWithSegme
         RecordStop(run, e.what(), result);
         continue;
       }
-      if (!estimator.failed()) throw;  // another part failed, such as a record
+      // Not the estimator failed but another part, such as a record.
+      if (!estimator.failed()) throw;
       events.push_back({estimator.timestamp(), EventKind::kFailed, e.what()});
     }
     run.finished = estimator.failed();
@@ -224,7 +226,8 @@ void SmoothAll(std::vector<EstimatorRun>& runs, const std::vector<FrameWithSegme
   }
 }
 
-/// Returns why the estimates of a reference are not usable for a comparison, or "".
+/// Returns the reason why the estimates of a reference cannot be used for a comparison, or "" if
+/// they can.
 std::string WhyNoReference(const EstimatorRun& reference) {
   const Estimator& estimator = *reference.spec.estimator;
   const char* state = nullptr;
@@ -278,10 +281,10 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     try {
       call();
     } catch (...) {
-      // The results so far remain.
+      // The results up to this frame remain valid.
       Failure failure = CaughtFailure();
       const bool was_stopped = failure.code == ExitCode::kStopped;
-      if (was_stopped && result.status != RunStatus::kOk) return;  // it stays a failure
+      if (was_stopped && result.status != RunStatus::kOk) return;  // the earlier status remains
       Fail(result, failure.code, std::move(failure.reason));
       if (was_stopped) result.status = RunStatus::kStopped;
     }

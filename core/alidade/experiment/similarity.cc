@@ -9,18 +9,19 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns whether p and q with these variances determine s > 0. Their correlation is
-/// s sqrt(var p / var q); a correlation of 1e-9 is rounding. Points on a line determine s and the
-/// residual, but not the rotation about the line.
+/// Returns whether points p and q with these variances determine s > 0. Their correlation is s
+/// sqrt(var p / var q). A correlation of 1e-9 may be due to rounding errors. Points on a line
+/// determine s and the residual, but not the rotation about the line.
 bool DeterminesScale(double scale, double variance, double target_variance) {
   constexpr double kMinCorrelation = 1e-9;
   return variance > 0.0 && target_variance > 0.0 &&
          scale * std::sqrt(variance / target_variance) > kMinCorrelation;
 }
 
-/// Computes the symmetric N with q' N q = tr(R' C) for every unit quaternion q = (w, x, y, z) of R.
-/// Its largest eigenvalue is the maximum of tr(R' C): the sum of the singular values of C, the last
-/// one with the sign of det C. The eigenvector is the quaternion of that R [Horn1987].
+/// Computes the symmetric matrix N that satisfies q' N q = tr(R' C) for the unit quaternion q = (w,
+/// x, y, z) of any rotation R. The largest eigenvalue of N is the maximum of tr(R' C): the sum of
+/// the singular values of C, the last one with the sign of det C. The eigenvector is the quaternion
+/// of the R that attains this maximum [Horn1987].
 Eigen::Matrix4d HornMatrix(const Eigen::Matrix3d& c) {
   Eigen::Matrix4d n;
   n(0, 0) = c(0, 0) + c(1, 1) + c(2, 2);

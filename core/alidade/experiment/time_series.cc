@@ -31,7 +31,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Series minus its mean, with the sums of its first k values and of their squares.
+/// Series minus its mean, with the sums of its first k values and of the squares of these values.
 struct CentredSeries {
   Eigen::VectorXd values, sums, squares;
 
@@ -41,7 +41,7 @@ struct CentredSeries {
         squares(values.size() + 1) {
     const double scale = values.cwiseAbs().maxCoeff();
     values.array() -= values.mean();
-    // The remainder of a constant is rounding.
+    // If the series is constant, only rounding errors remain.
     if (!(values.cwiseAbs().maxCoeff() > 1e-13 * scale)) values.setZero();
     sums[0] = squares[0] = 0.0;
     for (Eigen::Index i = 0; i < values.size(); ++i) {
@@ -52,14 +52,15 @@ struct CentredSeries {
   double Sum(Eigen::Index first, Eigen::Index count) const {
     return sums[first + count] - sums[first];
   }
-  /// Returns the sum of squares about the mean of the window.
+  /// Returns the sum of squared deviations from the mean of the window.
   double Spread(Eigen::Index first, Eigen::Index count) const {
     const double sum = Sum(first, count);
     return squares[first + count] - squares[first] - sum * sum / static_cast<double>(count);
   }
 };
 
-/// Overlap of two series of n values, one shifted by `shift`: first indices and length.
+/// Overlap of two series of n values, of which one is shifted by `shift`: the first index in each
+/// series, and the length.
 struct Overlap {
   Eigen::Index signal, reference, count;
 
@@ -81,7 +82,7 @@ double Correlation(const CentredSeries& signal, const CentredSeries& reference,
   return spread > 0.0 ? product / std::sqrt(spread) : kNaN;
 }
 
-/// Computes minus the mean of (reference(i) - signal(i + shift))^2.
+/// Returns the negative mean of (reference(i) - signal(i + shift))^2.
 double Closeness(const std::vector<double>& signal, const std::vector<double>& reference,
                  Eigen::Index shift) {
   const Overlap o(std::ssize(reference), shift);
@@ -90,7 +91,7 @@ double Closeness(const std::vector<double>& signal, const std::vector<double>& r
   return -(r - s).squaredNorm() / static_cast<double>(o.count);
 }
 
-/// Returns whether the series correlates with itself at every shift up to `reach`.
+/// Returns whether the correlation of the series with itself is high at every shift up to `reach`.
 bool IsRamp(const CentredSeries& series, Eigen::Index reach) {
   constexpr double kMinCorrelation = 0.9;
   for (Eigen::Index k = 1; k <= reach; ++k) {
@@ -99,9 +100,9 @@ bool IsRamp(const CentredSeries& series, Eigen::Index reach) {
   return true;
 }
 
-/// Returns the position, from the middle, of the maximum of a parabola through the largest score
-/// and its neighbours. Returns NaN if the largest score is at the edge, or exceeds its neighbours
-/// only by rounding.
+/// Fits a parabola through the largest score and its two neighbours. Returns the position of its
+/// maximum, relative to the middle of the scores. Returns NaN if the largest score is at the edge,
+/// or if it exceeds its neighbours only by rounding errors.
 double Peak(const Eigen::VectorXd& scores) {
   constexpr double kRounding = 1e-12;
   const Eigen::Index middle = scores.size() / 2;
@@ -143,7 +144,8 @@ Settling SettlingOf(const std::vector<double>& rms) {
   std::ranges::sort(last);
   const double level = Quantile(last, 0.5);
   const auto values = Eigen::VectorXd::Map(rms.data(), n);
-  std::ptrdiff_t outside = n - kReach - 1;  // the last centre outside the band, or -1
+  // Index of the last value whose rms is outside the band, or -1.
+  std::ptrdiff_t outside = n - kReach - 1;
   for (; outside >= 0; --outside) {
     const std::ptrdiff_t reach = std::min(outside, kReach);
     const auto window = values.segment(outside - reach, 2 * reach + 1);

@@ -150,7 +150,7 @@ TEST(CramerRaoBound, TellsWhyThereIsNone) {
   EXPECT_EQ(CramerRaoBound::WhyUnavailable(slam, kTruths), "");
   slam.sensors[1].stream = slam.sensors[0].stream;
   EXPECT_EQ(CramerRaoBound::WhyUnavailable(slam, kTruths),
-            "'disparity' and 'inverse_scale' share a stream");
+            "'disparity' and 'inverse_scale' use the same stream");
 }
 
 using Point = std::array<double, 3>;

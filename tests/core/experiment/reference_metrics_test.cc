@@ -220,7 +220,7 @@ TEST(Reference, IsNamedBelowTheTableInRunJsonAndInTheReport) {
   const RunResult run = RunInto(recorder, experiment);
   recorder.Finish(run);
   const std::string words =
-      "errors are differences from estimator 'known', an estimate itself: no coverage, no NEES";
+      "errors are differences from estimator 'known', which is not the truth: no coverage, no NEES";
   EXPECT_TRUE(ComparisonTable(run).ends_with('\n' + words + '\n')) << ComparisonTable(run);
   EXPECT_NE(Read(folder / "out/run.json").find("\"reference\": \"known\""), std::string::npos);
   EXPECT_NE(Read(folder / "out/report.html").find("differences from estimator"), std::string::npos);

@@ -311,7 +311,7 @@ TEST(SensorStates, RefusesByKeyAndRemedy) {
   expect(keys("dynamics: {clock_bias: {gauss_markov: {sigma: 1, time_constant_s: 0}}}"),
          "time_constant_s");
   expect(keys("consider: [position]"), "no block 'position' in this entry");
-  expect(keys("consider: [clock_bias], constant: [clock_bias]"), "it has no uncertainty");
+  expect(keys("consider: [clock_bias], constant: [clock_bias]"), "a constant has no uncertainty");
   expect(Filled("  gnss: {model: constant, blocks: {value: clock_bias}, initial: {clock_bias: "
                 "{mean: 0, sigma: 1}}}\n",
                 "", ""),

@@ -66,7 +66,7 @@ std::string IsLoss(const std::string& text) {
          ", or NAME=SCALE, in standard deviations";
 }
 
-/// Splits `k1,k2` into its names.
+/// Splits a text such as `k1,k2` at its commas.
 std::vector<std::string> SplitNames(const std::string& text) {
   std::vector<std::string> names(1);
   for (const char c : text) {
@@ -93,7 +93,7 @@ BundleFile Read(const BundleArguments& arguments, const PluginHost& host) {
   return ReadBundleTracks(tracks, host);
 }
 
-/// Returns true if the camera model of the format also projects points behind the camera.
+/// Returns true if the camera model of this format also projects points that are behind the camera.
 bool IsProjective(BundleFormat format) {
   return format == BundleFormat::kBal || format == BundleFormat::kBundler;
 }
@@ -105,16 +105,19 @@ std::string Describe(const BundleFile& file, int left_out) {
                      std::to_string(problem.points.size()) + " points, " +
                      std::to_string(problem.observations.size()) + " observations";
   if (left_out > 0) {
-    text += "; " + std::to_string(left_out) + " left out, undefined or not finite at the start: " +
+    text += "; " + std::to_string(left_out) +
+            " left out, because the residual is undefined or not finite at the start: " +
             (IsProjective(file.format) ? "in the camera's plane" : "behind the camera");
   }
   if (file.invalid_observations > 0)
-    text +=
-        "; " + std::to_string(file.invalid_observations) + " not valid, such as outside the image";
+    text += "; " + std::to_string(file.invalid_observations) +
+            " are invalid, for example outside the image";
   if (file.frames_left_out > 0)
-    text += "; " + std::to_string(file.frames_left_out) + " frames without a pose left out";
+    text +=
+        "; " + std::to_string(file.frames_left_out) + " frames left out, because they have no pose";
   if (file.points_left_out > 0)
-    text += "; " + std::to_string(file.points_left_out) + " points without parallax left out";
+    text += "; " + std::to_string(file.points_left_out) +
+            " points left out, because they have no parallax";
   if (file.unplaced_observations > 0)
     text += "; " + std::to_string(file.unplaced_observations) +
             " observations of these frames and points left out";
@@ -207,7 +210,7 @@ void AddBundle(CLI::App& program, Action& action) {
           "; NAME=SCALE sets the scale in standard deviations, such as huber=2; default none")
       ->check(IsLoss);
   add("--fix", arguments->fixed, "NAME,...",
-      "keep intrinsics constant: `intrinsics` for all, or elements such as k1,k2")
+      "keep these intrinsics constant: `intrinsics` for all, or elements such as k1,k2")
       ->check(AreNames)
       ->allow_extra_args(false);
   add("--max-iterations", arguments->iterations, "N", "maximum number of iterations; default 500")

@@ -35,7 +35,7 @@ bool IsFile(const std::string& plugin) {
   return plugin.find('/') != plugin.npos || plugin.ends_with(".so");
 }
 
-/// Returns the parameters of the model `entry` from the command line.
+/// Returns the parameters of the model `entry` that the command line sets.
 Config Parameters(const CheckArguments& arguments, const PluginEntry& entry, bool is_only_model) {
   Config config = Config::FromText("{}", entry.name);
   for (const std::string& set : arguments.sets) {
@@ -48,7 +48,7 @@ Config Parameters(const CheckArguments& arguments, const PluginEntry& entry, boo
   return config;
 }
 
-/// Rejects a `--set` that does not name one of several models.
+/// Rejects a `--set` that does not name a model, if there are several models.
 void RequireModels(const CheckArguments& arguments, const std::vector<PluginEntry>& entries) {
   for (const std::string& set : arguments.sets) {
     const auto names_model = [&](const PluginEntry& entry) {
@@ -61,7 +61,8 @@ void RequireModels(const CheckArguments& arguments, const std::vector<PluginEntr
   }
 }
 
-/// Checks a model with these parameters and prints the findings. Returns true if a check failed.
+/// Checks a model with the given parameters, and prints the findings. Returns true if a check
+/// failed.
 bool CheckAndPrint(const PluginEntry& entry, const Node& parameters, const CheckOptions& options) {
   const auto findings = CheckModel(entry, parameters, options);
   const std::string prefix = parameters.path().empty() ? "" : parameters.path() + ": ";
@@ -69,8 +70,8 @@ bool CheckAndPrint(const PluginEntry& entry, const Node& parameters, const Check
   return AnyFailure(findings);
 }
 
-/// Returns the lines of an error with `model 'NAME'` instead of a place in the text of the model's
-/// parameters, because that text is not in a file.
+/// Returns the lines of an error. Replaces each place in the parameters by `model 'NAME'`, because
+/// these parameters are not in a file.
 std::string NameModelInErrors(const std::string& name, const std::string& lines) {
   const std::string placeholder = name + ":1:1 ";
   std::string text;
@@ -86,7 +87,8 @@ std::string NameModelInErrors(const std::string& name, const std::string& lines)
   return text;
 }
 
-/// Checks the models with the parameters of the command line. Returns true if a check failed.
+/// Checks the models with the parameters that the command line sets. Returns true if a check
+/// failed.
 bool CheckAllAndPrint(const std::vector<PluginEntry>& entries, const CheckArguments& arguments) {
   RequireModels(arguments, entries);
   bool failed = false;

@@ -32,9 +32,9 @@ Exit code 1: no reference or no measurement was available for the comparison; 65
 different data.)";
 
 struct CompareArguments {
-  std::string command;             ///< the whole command line
-  Input input;                     ///< without its config
-  std::vector<std::string> paths;  ///< of a config, or of folders
+  std::string command;             ///< complete command line
+  Input input;                     ///< input options; the config is in `paths`
+  std::vector<std::string> paths;  ///< path of one config, or of several folders
   std::string folder;
   std::optional<std::uint64_t> seed;
   SweepOptions sweep;
@@ -59,8 +59,8 @@ void Report(const Comparison& comparison, const CompareArguments& arguments,
   if (!folder.empty() && !arguments.quiet) PrintNote("wrote " + folder.string());
 }
 
-/// Returns the exit code. A withheld comparison takes precedence over an estimator or a seed that
-/// failed. Any other failure of the run takes precedence over a withheld comparison.
+/// Returns the exit code. If the comparison is withheld, its code replaces that of a failed
+/// estimator or seed, but not that of any other failure of the run.
 ExitCode CodeOf(const Comparison& comparison, ExitCode run_code) {
   const bool is_minor =
       run_code == ExitCode::kOk || run_code == ExitCode::kDiverged || run_code == ExitCode::kFound;
@@ -69,7 +69,8 @@ ExitCode CodeOf(const Comparison& comparison, ExitCode run_code) {
   return ExitCode::kFound;
 }
 
-/// Returns true if only added estimators failed. The comparison reports their failures.
+/// Returns true if all failed estimators are ones that the comparison added. The comparison then
+/// reports these failures.
 bool OnlyAddedFailed(const RunResult& result, const ComparedExperiment& compared) {
   return result.code == ExitCode::kDiverged &&
          std::ranges::all_of(result.estimators, [&](const EstimatorResult& estimator) {
@@ -77,7 +78,7 @@ bool OnlyAddedFailed(const RunResult& result, const ComparedExperiment& compared
          });
 }
 
-/// Adds the files of the comparison to the folder of a run or a sweep.
+/// Adds the files of the comparison to the folder of a run or sweep.
 void AddFiles(auto& folder, const Comparison& comparison) {
   folder.AddFile("compare.json", CompareJson(comparison));
   folder.AddFile("compare.md", CompareReport(comparison, TableStyle::kMarkdown));
@@ -91,7 +92,7 @@ std::string DurationText(double s) {
                     : internal::RoundedText(s / 3600.0, 2) + " h";
 }
 
-/// Forecast of the total duration, printed once if it is at least 10 s.
+/// Forecast of the total duration. It is printed once, and only if it is at least 10 s.
 class Forecast {
  public:
   Forecast(const CompareArguments& arguments, std::int64_t jobs, Progress& progress)
@@ -106,8 +107,9 @@ class Forecast {
     Report(rounds * elapsed_s(), "the first of " + std::to_string(total) + " runs took " +
                                      DurationText(elapsed_s()) + ": all runs may take ");
   }
-  /// Computes the forecast after the first seconds. It is a lower bound: a batch that solves at
-  /// each frame has more data each time, and a batch of all data is solved after the last frame.
+  /// Computes the forecast after the first seconds. The forecast is a lower bound: a batch that
+  /// solves at each frame has more data each time, and a batch of all data is solved after the last
+  /// frame.
   void UpdateFromFrames(std::int64_t done, std::int64_t total) {
     if (total <= 0 || elapsed_s() < 2.0) return;
     Report(elapsed_s() * static_cast<double>(total) / static_cast<double>(done),
@@ -160,7 +162,7 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   Comparison comparison;
   try {
     comparison = comparer.Finish(result, run_options);
-  } catch (const Error&) {  // keep the run, and report its own reason if it has one
+  } catch (const Error&) {  // the run remains, and its own failure is reported first
     recorder.Finish(result);
     if (result.status == RunStatus::kOk) throw;
     if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
@@ -210,7 +212,7 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExper
     if (failed++ == 0) PrintErrors("seed " + std::to_string(run.seed) + ": " + run.reason);
   }
   if (failed > 1) PrintErrors(std::to_string(failed) + " runs failed: see failures.csv");
-  const bool has_results = !comparison.estimators.empty();  // false if no run finished
+  const bool has_results = !comparison.estimators.empty();  // false if no run has finished
   std::string figure_note;
   if (has_results) AddFiles(sweep_folder, comparison);
   if (has_results)
@@ -251,8 +253,8 @@ ExitCode CompareFinished(const CompareArguments& arguments) {
   return CodeOf(comparison, ExitCode::kOk);
 }
 
-/// Returns true if all paths are folders. Rejects paths that are neither all folders nor one
-/// config.
+/// Returns true if all paths are folders, and false for a single config. Rejects any other list of
+/// paths.
 bool AreFolders(const std::vector<std::string>& paths) {
   const auto is_folder = [](const std::string& path) {
     std::error_code error;
@@ -287,15 +289,16 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
       ->option_text("truth|NAME");
   command
       .add_option("--filter", arguments.options.filter,
-                  "the filter whose error is decomposed; default: the first")
+                  "the filter whose error is decomposed; default: the first filter")
       ->option_text("NAME");
   command.add_flag("--no-decomposition", arguments.no_decomposition,
-                   "do not decompose the error, and add no estimators for it");
+                   "do not decompose the error, and do not add the estimators that this needs");
   command.add_option("--runs", arguments.sweep.runs, "compare over N seeds")
       ->option_text("N")
       ->check(IsInteger(1, 1'000'000));
   command
-      .add_option("--first-seed", arguments.sweep.first_seed, "seeds count up from S; default 1")
+      .add_option("--first-seed", arguments.sweep.first_seed,
+                  "use the seeds S, S + 1, ...; default 1")
       ->option_text("S")
       ->check(IsInteger(0, std::int64_t{1} << 62))
       ->needs("--runs");
@@ -307,8 +310,8 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
       ->needs("--runs");
   command
       .add_option("--budget", arguments.options.budget_s,
-                  "start no run that would end later; in one run, add no estimator that takes "
-                  "longer")
+                  "time in s: do not start a run that would end later; in one run, do not add an "
+                  "estimator that would take longer")
       ->option_text("SECONDS")
       ->check(IsNumber(1e-9, 1e9));
   AddSeed(command, arguments.seed)->excludes("--first-seed");
@@ -316,7 +319,7 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
           "set a key of the config, in dotted form; may be repeated");
   AddPluginPath(command, arguments.input.plugin_paths);
   command.add_flag("--allow-outside", arguments.input.allow_outside,
-                   "allow `include:` and `output:` of the config outside their folders");
+                   "allow the paths of `include:` and `output:` to leave their folders");
   AddOutput(command, arguments.folder,
             "folder; default for a config: its `output:`, or compare-NAME, in runs/; for folders: "
             "nothing is written");

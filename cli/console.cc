@@ -21,7 +21,7 @@ namespace {
 std::atomic<bool> stop_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
 
-/// Requests a stop; the second signal ends the process.
+/// Requests a stop at the first signal. The second signal ends the process.
 extern "C" void HandleStop(int signal_number) {
   if (!stop_requested.exchange(true)) return;
   ::signal(signal_number, SIG_DFL);
@@ -39,10 +39,11 @@ bool WriteAll(int fd, std::string_view text) {
   return true;
 }
 
-/// Returns `text` without control characters that a terminal obeys, except line ends and tabs.
+/// Returns `text` with `?` for each control character except line ends and tabs. A terminal would
+/// obey control characters.
 std::string Sanitise(std::string_view text) { return internal::PrintableUtf8(text, "\n\t"); }
 
-/// Writes to standard error. A failure is ignored, because it cannot be reported.
+/// Writes to standard error. Ignores a failure, because there is no other place to report it.
 void WriteError(std::string_view text) { static_cast<void>(WriteAll(STDERR_FILENO, text)); }
 
 bool IsSet(const char* variable) {
@@ -59,13 +60,13 @@ bool IsTerminal() {
 
 bool SupportsColour() { return IsTerminal() && !IsSet("NO_COLOR"); }
 
-/// Returns `label: `, with the label in `colour` if `coloured`.
+/// Returns `label: `. The label has the colour `colour` if `coloured` is true.
 std::string FormatLabel(const char* label, const char* colour, bool coloured) {
   const std::string text = std::string(label) + ':';
   return (coloured ? "\033[1;" + std::string(colour) + 'm' + text + "\033[0m" : text) + ' ';
 }
 
-/// State of the progress line. Messages of any thread are printed above the line.
+/// State of the progress line. Messages from all threads are printed above this line.
 std::mutex progress_mutex;
 std::size_t progress_width = 0;
 
@@ -131,7 +132,7 @@ void Progress::Show(std::int64_t done, std::int64_t total) {
   if (total > 0) line += " of " + std::to_string(total);
   line.append(" ").append(unit_);
   if (total > 0) line += ", " + std::to_string(100 * done / total) + " %";
-  // Blanks, not an escape sequence, overwrite the end of a longer previous line.
+  // If the previous line was longer, blanks overwrite its end. Escape sequences are not needed.
   const std::lock_guard lock(progress_mutex);
   const std::size_t width = line.size();
   if (width < progress_width) line.append(progress_width - width, ' ');
@@ -148,12 +149,12 @@ void StopOnSignals() {
   struct sigaction action {};
   action.sa_handler = HandleStop;
   sigemptyset(&action.sa_mask);
-  action.sa_flags = 0;  // interrupts a read that waits for data
+  action.sa_flags = 0;  // without SA_RESTART, a signal interrupts a read that waits for data
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
   struct sigaction hangup {};
   ::sigaction(SIGHUP, nullptr, &hangup);
-  if (hangup.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);  // not under nohup
+  if (hangup.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);  // false under nohup
 }
 
 bool StopRequested() { return stop_requested; }

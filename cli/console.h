@@ -10,15 +10,15 @@
 
 namespace alidade::cli {
 
-/// Turns a write to a closed pipe, or beyond the size limit of a file, into an error instead of a
-/// signal that ends the process.
+/// Disables the signals of two failed writes: to a closed pipe, and beyond the size limit of a
+/// file. Such a write then reports an error instead of ending the process.
 void PrepareConsole();
 
 /// Writes `text` to standard output. Error: kIo if a byte cannot be written.
 void Print(std::string_view text);
 
 /// Prints `error: LINE` on standard error for each line. An indented line continues the line above.
-/// Prints `?` for control characters and for bytes that are not UTF-8; PrintNote does the same.
+/// Prints `?` for each control character and each byte that is not UTF-8, as PrintNote does.
 void PrintErrors(std::string_view text);
 void PrintNote(std::string_view text);
 
@@ -26,8 +26,8 @@ void PrintNote(std::string_view text);
 /// `LEVEL: TEXT`. The level is in colour on a terminal.
 void ShowLog(LogLevel minimum_level);
 
-/// Progress line of a command on the terminal of standard error. It is not printed if standard
-/// error is not a terminal, or if `quiet`.
+/// Progress line of a command, printed on standard error. Nothing is printed if standard error is
+/// not a terminal, or if `quiet` is true.
 class Progress {
  public:
   Progress(const char* unit, bool quiet);
@@ -35,7 +35,7 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `total` is negative if it is unknown.
+  /// Shows the progress. `total` is negative if it is unknown.
   void Show(std::int64_t done, std::int64_t total);
   void Clear();
 
@@ -46,7 +46,7 @@ class Progress {
 };
 
 /// Installs handlers for SIGINT, SIGTERM and, unless it is ignored, SIGHUP. The first signal
-/// requests a stop of the command; a second one ends the process at once.
+/// requests that the command stop. A second signal ends the process at once.
 void StopOnSignals();
 bool StopRequested();
 

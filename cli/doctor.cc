@@ -91,7 +91,8 @@ std::string RemedyFor(const Refusal& refusal) {
   return "rebuild it for this alidade, or remove it";
 }
 
-/// Reports whether the batch estimator is built; it is only built if its solver is installed.
+/// Reports whether the batch estimator was built. The build omits it if its solver is not
+/// installed.
 void CheckBatch(const PluginHost& host, Diagnosis& diagnosis) {
   const auto is_batch = [](const PluginEntry& entry) {
     return entry.kind == kEstimatorKind && EstimatorOf(entry).kind == EstimatorKind::kBatch;
@@ -100,7 +101,7 @@ void CheckBatch(const PluginHost& host, Diagnosis& diagnosis) {
   if (batch != host.entries().end()) {
     diagnosis.Ok("batch estimator: " + batch->name);
   } else {
-    diagnosis.Warn("the batch estimator is not built: no filter can be compared with a batch",
+    diagnosis.Warn("the batch estimator is not built: filters cannot be compared with a batch",
                    "apt-get install libceres-dev, then configure and build all targets");
   }
 }
@@ -144,9 +145,10 @@ bool IsOnPath(const char* program) {
 
 void CheckEnvironment(Diagnosis& diagnosis) {
   if (IsOnPath("gnuplot")) {
-    diagnosis.Ok("gnuplot: runs have figures");
+    diagnosis.Ok("gnuplot is installed: runs draw figures");
   } else {
-    diagnosis.Warn("gnuplot is not installed: runs have no figures", "apt-get install gnuplot-nox");
+    diagnosis.Warn("gnuplot is not installed: runs do not draw figures",
+                   "apt-get install gnuplot-nox");
   }
   const char* const data = std::getenv("ALIDADE_DATA");
   const std::string remedy =
@@ -161,7 +163,8 @@ void CheckEnvironment(Diagnosis& diagnosis) {
   }
 }
 
-/// Creates a folder: permissions do not show that a file system is read-only or full.
+/// Reports whether the current folder is writable. Creates a folder to test this, because
+/// permissions do not show that a file system is read-only or full.
 void CheckCurrentFolder(Diagnosis& diagnosis) {
   std::string name = ".alidade-doctor-XXXXXX";
   if (::mkdtemp(name.data()) != nullptr) {

@@ -36,7 +36,8 @@ struct EvalArguments {
   OutputFormat output_format = OutputFormat::kText;
 };
 
-/// Validator of CLI11: accepts the name of one of `values`, and replaces it by its number.
+/// Returns a validator for CLI11 that accepts the names of `values`, and replaces a name by the
+/// number of its value.
 template <class T>
 CLI::Validator OneOf(std::initializer_list<T> values) {
   const auto choose = [choices = std::vector<T>(values)](std::string& text) -> std::string {
@@ -89,7 +90,8 @@ std::string Text(const std::vector<Evaluation>& evaluations, OutputFormat output
   return EvaluationText(evaluations);
 }
 
-/// Replaces each label that several estimates have by the name of the estimate's file.
+/// If several estimates have the same label, replaces each of these labels by the name of the
+/// estimate's file.
 void MakeUnique(std::vector<Evaluation>& evaluations) {
   std::map<std::string, int> counts;
   for (const Evaluation& evaluation : evaluations) ++counts[evaluation.label];
@@ -110,7 +112,7 @@ Evaluation Failed(const Trajectory& reference, const TrajectoryFile& file,
   return failed;
 }
 
-/// Returns true if the only argument is a run, which is compared with its own truth.
+/// Returns true if the only argument is a run. Its estimates are then compared with its own truth.
 bool IsSingleRun(const EvalArguments& arguments) { return arguments.estimates.empty(); }
 
 std::vector<TrajectoryFile> FilesOf(const EvalArguments& arguments) {
@@ -156,7 +158,7 @@ ExitCode RunEval(const EvalArguments& arguments) {
   return code;
 }
 
-/// Rejects options that are invalid together.
+/// Rejects invalid combinations of options.
 void CheckCombinations(const EvalArguments& arguments) {
   const PairOptions& pairs = arguments.options.pairs;
   if (pairs.unit == DeltaUnit::kFrames && pairs.delta != std::floor(pairs.delta)) {
@@ -172,9 +174,10 @@ void CheckCombinations(const EvalArguments& arguments) {
 
 void AddAlignment(CLI::App& command, EvalArguments& a) {
   CLI::Option* se3 = command.add_flag(
-      "-a,--align", a.se3, "align by rotation and translation (se3); with -s by scale too (sim3)");
+      "-a,--align", a.se3, "align by rotation and translation (se3); with -s also by scale (sim3)");
   CLI::Option* scale =
-      command.add_flag("-s,--correct-scale", a.scale, "align by scale; with -a by sim3");
+      command.add_flag("-s,--correct-scale", a.scale,
+                       "align by scale; with -a by rotation and translation too (sim3)");
   CLI::Option* origin =
       command.add_flag("--align-origin", a.origin, "align the first poses with each other");
   CLI::Option* mode =
@@ -208,7 +211,8 @@ void AddErrors(CLI::App& command, EvalArguments& a) {
       ->check(IsNumber(1e-9, 1e9));
   command
       .add_option("-u,--delta-unit", a.options.pairs.unit,
-                  "RPE: f (poses, default), m (along the trajectory), s, d (degrees) or r (rad)")
+                  "RPE: unit of --delta: f (poses, default), m (along the trajectory), s, d "
+                  "(degrees) or r (rad)")
       ->option_text("UNIT")
       ->transform(OneOf({DeltaUnit::kFrames, DeltaUnit::kMetres, DeltaUnit::kSeconds,
                          DeltaUnit::kDegrees, DeltaUnit::kRadians}));
@@ -257,7 +261,7 @@ void AddEval(CLI::App& program, Action& action) {
   const auto arguments = std::make_shared<EvalArguments>();
   command
       .add_option("REF", arguments->reference,
-                  "the reference: a file or a run folder; without EST, a run folder, which is "
+                  "the reference: a file or a run folder; if EST is missing, a run folder that is "
                   "compared with its own truth")
       ->option_text(" ")
       ->required()

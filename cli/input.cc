@@ -22,7 +22,7 @@ std::string IsAssignment(const std::string& text) {
   return "'" + text + "' is not an assignment; expected key=value, as in source.seed=7";
 }
 
-/// Returns the absolute path in its shortest form.
+/// Returns the absolute path without `.`, `..` and repeated slashes.
 fs::path FullPath(const fs::path& path) {
   std::error_code error;
   const fs::path full = fs::absolute(path, error).lexically_normal();
@@ -44,7 +44,7 @@ std::string DefaultOutputName(const fs::path& config) {
 
 constexpr const char* kRuns = "runs";
 
-/// Returns true if `folder` is runs/ itself, which contains all runs: --force would delete them.
+/// Returns true if `folder` is runs/ itself. It contains all runs, which --force would delete.
 bool IsRunsFolder(const fs::path& folder) {
   std::error_code error;
   const fs::path runs = fs::absolute(kRuns, error) / "";
@@ -60,7 +60,7 @@ std::function<std::string(const std::string&)> IsInteger(std::int64_t minimum,
     const char* const end = text.data() + text.size();
     const auto [parsed_end, error] = std::from_chars(text.data(), end, value);
     const bool is_integer = error == std::errc() && parsed_end == end;
-    // CLI11 later parses the text as C does: 010 is 8.
+    // CLI11 would later parse the text as C does, so 010 would be 8.
     const std::size_t first = text.starts_with('-') ? 1 : 0;
     if (is_integer && text.size() > first + 1 && text[first] == '0')
       return "'" + text + "' has a leading zero";
@@ -106,7 +106,7 @@ void AddOutput(CLI::App& command, std::string& folder, const std::string& help) 
 }
 
 CLI::Option* AddSeed(CLI::App& command, std::optional<std::uint64_t>& seed) {
-  return command.add_option("--seed", seed, "seed of the source instead of the config's")
+  return command.add_option("--seed", seed, "seed of the source; replaces that of the config")
       ->option_text("N")
       ->check(IsInteger(0, INT64_MAX));
 }
@@ -119,7 +119,7 @@ void Input::AddTo(CLI::App& command) {
   AddSets(command, sets, "set a key of the config, in dotted form; may be repeated");
   AddPluginPath(command, plugin_paths);
   command.add_flag("--allow-outside", allow_outside,
-                   "allow `include:` and `output:` of the config outside their folders");
+                   "allow the paths of `include:` and `output:` to leave their folders");
 }
 
 Config Input::Load() const {
@@ -139,7 +139,7 @@ std::vector<fs::path> Absolute(const std::vector<std::string>& paths) {
 
 namespace {
 
-/// Returns the plugin paths of the config and of the command line.
+/// Returns the plugin paths that the config and the command line name.
 std::vector<fs::path> PluginPathsOf(const Input& input, const Config& loaded) {
   std::vector<fs::path> places;
   for (const fs::path& path : PluginPaths(loaded)) places.push_back(FullPath(path));

@@ -56,7 +56,8 @@ std::string CommandLine(const ArgumentList& arguments) {
 }
 
 /// Returns the arguments in reverse order, as CLI11 expects them. Replaces underscores in the names
-/// of options by hyphens: `--t_max_diff` of evo is `--t-max-diff`. Keeps arguments after `--`.
+/// of options by hyphens: `--t_max_diff` of evo is `--t-max-diff`. Does not change arguments after
+/// `--`.
 ArgumentList ReversedArguments(ArgumentList arguments) {
   for (std::string& argument : arguments) {
     if (argument == "--") break;
@@ -74,8 +75,8 @@ std::string IsLogLevel(const std::string& text) {
   return LogLevelOf(text) ? "" : "'" + text + "' is not a level; expected " + kLogLevels;
 }
 
-/// Returns the log level of the terminal: `log_level` of --log-level, else error under --quiet,
-/// else the level in ALIDADE_LOG, else warning.
+/// Returns the log level of the terminal: `log_level` if --log-level is present. Otherwise error if
+/// --quiet is present, else the level that ALIDADE_LOG names, else warning.
 LogLevel LogLevelFor(const CLI::App& command, const std::string& log_level) {
   if (!log_level.empty()) return *LogLevelOf(log_level);
   const CLI::Option* quiet = command.get_option_no_throw("--quiet");
@@ -154,7 +155,8 @@ std::string UsageErrorText(const CLI::App& command, const CLI::ParseError& error
   return problem + word + "'" + Suggestion(command, word);
 }
 
-/// Returns the name of a command with those of its parents, such as `alidade plugins info`.
+/// Returns the name of a command, preceded by the names of its parents, such as `alidade plugins
+/// info`.
 std::string FullName(const CLI::App& command) {
   const CLI::App* parent = command.get_parent();
   return parent == nullptr ? command.get_name() : FullName(*parent) + ' ' + command.get_name();
@@ -214,8 +216,9 @@ ExitCode RunGuarded(int argc, char** argv) {
 }  // namespace alidade::cli
 
 int main(int argc, char** argv) {
-  // Ceres logs with glog, which reads this variable when the Ceres plugins load it: print only
-  // fatal errors. The solver's reports are in its results. A value set by the user is kept.
+  // Ceres logs with glog, which reads this variable when the Ceres plugins load glog. The value 3
+  // means that only fatal errors are printed; the results contain the solver's reports. A value
+  // that the user has set does not change.
   setenv("GLOG_minloglevel", "3", 0);
   alidade::cli::PrepareConsole();
   return static_cast<int>(alidade::cli::RunGuarded(argc, argv));

@@ -28,7 +28,7 @@ struct PluginsArguments {
 
 using Listing = std::string (*)(const PluginHost&, const PluginsArguments&);
 
-/// Adds the options of a subcommand that prints the text of `listing`.
+/// Adds the options of a subcommand that prints the text that `listing` returns.
 std::shared_ptr<PluginsArguments> AddListing(CLI::App& command, Action& action, Listing listing,
                                              OnRefusal on_refusal = OnRefusal::kThrow) {
   const auto arguments = std::make_shared<PluginsArguments>();
@@ -67,7 +67,7 @@ void AddPlugins(CLI::App& program, Action& action) {
   CLI::App& list =
       *plugins.add_subcommand("list", "List the models, sources and estimators that are available");
   const auto list_arguments = AddListing(list, action, List);
-  list.add_flag("-v,--verbose", list_arguments->files, "print the file of each plugin too");
+  list.add_flag("-v,--verbose", list_arguments->files, "also print the file of each plugin");
   list.add_flag("--json", list_arguments->json, "print JSON");
   CLI::App& info = *plugins.add_subcommand("info", "Describe a model, source or estimator");
   const auto info_arguments = AddListing(info, action, Info);
@@ -77,7 +77,8 @@ void AddPlugins(CLI::App& program, Action& action) {
       ->required();
   info.add_flag("--json", info_arguments->json, "print JSON");
   CLI::App& places = *plugins.add_subcommand(
-      "where", "List the searched folders, their plugins, and the refused ones with reasons");
+      "where",
+      "List the searched folders, their plugins, and the refused plugins with the reasons");
   AddListing(places, action, Where, OnRefusal::kList);
 }
 

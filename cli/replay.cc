@@ -31,7 +31,7 @@ struct ReplayArguments {
   bool json = false, quiet = false;
 };
 
-/// Temporary folder, removed by the destructor.
+/// Temporary folder, which the destructor removes.
 class ScratchFolder {
  public:
   ScratchFolder() {
@@ -57,11 +57,13 @@ class ScratchFolder {
   fs::path path_;
 };
 
-/// Repeats the recorded command into `output`. Returns its exit code.
+/// Repeats the recorded command with the output folder `output`. Returns the exit code of the
+/// command.
 ExitCode RepeatCommand(const internal::RecordedInputs& recorded, const fs::path& folder,
                        const fs::path& scratch, const fs::path& output,
                        const std::function<ExitCode(const std::vector<std::string>&)>& execute) {
-  // The title contains the name of the config file. A folder of its own avoids a clash of names.
+  // The title contains the name of the config file, so the copy must have this name. The copy has a
+  // separate folder to avoid a clash of names.
   const fs::path config = scratch / "config" / fs::path(recorded.config).filename();
   std::error_code error;
   fs::create_directory(config.parent_path(), error);
@@ -94,7 +96,7 @@ ExitCode Replay(const ReplayArguments& arguments,
   const fs::path repeated =
       arguments.output.empty() ? scratch.path() / "made/again" : fs::path(arguments.output);
   const ExitCode code = RepeatCommand(recorded, folder, scratch.path(), repeated, execute);
-  if (StopRequested()) return ExitCode::kStopped;  // figures may be missing
+  if (StopRequested()) return ExitCode::kStopped;  // after a stop, figures may be missing
   std::error_code ignored;
   const bool is_complete = fs::exists(repeated / internal::kInputsFile, ignored);
   if (code == ExitCode::kStopped || code == ExitCode::kUsage || !is_complete) return code;
@@ -119,7 +121,7 @@ void AddReplay(CLI::App& program, Action& action,
       ->required()
       ->check(IsNonEmpty);
   AddOutput(command, arguments->output,
-            "keep the repeated run in this folder; default: a temporary folder");
+            "write the repeated run to this folder and keep it; default: a temporary folder");
   command.add_flag("--json", arguments->json, "print the result as JSON");
   command.add_flag("--quiet", arguments->quiet, "print differences and errors only");
   command.footer(kReplayFooter);

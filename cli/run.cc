@@ -34,7 +34,7 @@ so far and exits with code 75; a second Ctrl-C exits at once. While figures are 
 the remaining figures.)";
 
 struct RunArguments {
-  std::string command;  ///< the whole command line
+  std::string command;  ///< complete command line
   Input input;
   std::string folder;
   std::optional<std::uint64_t> seed;
@@ -43,7 +43,7 @@ struct RunArguments {
   std::string video;
 };
 
-/// Events of one estimator with the same kind.
+/// Events of one estimator that have the same kind.
 struct EventGroup {
   EventKind kind;
   std::vector<const Event*> events;
@@ -140,7 +140,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
   const Output output = OutputFolder(arguments.folder, config, arguments.input, arguments.force);
   const PluginHost host = arguments.input.HostFor(config);
-  StopOnSignals();  // before BuildExperiment, which may wait for a pipe
+  StopOnSignals();  // before BuildExperiment, because that may wait for a pipe
   Experiment experiment = BuildExperiment(config, host);
   const std::unique_ptr<RunViewer> viewer = ViewerOf(arguments, experiment, config);
   Recorder recorder(RecordOf(arguments, config, output.folder, host), config);
@@ -189,8 +189,9 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
                   "save an annotated video (features, gates, estimate); needs OpenCV")
       ->option_text("FILE")
       ->check(IsAvi);
-  command.add_flag("--view", arguments->view, "show the same in a window during the run");
-  command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
+  command.add_flag("--view", arguments->view,
+                   "show the annotated images in a window during the run");
+  command.add_flag("--no-figures", arguments->no_figures, "do not draw figures");
   command.add_flag("--covariances", arguments->covariances,
                    "write the covariance of every estimate, for `alidade compare`");
   command.footer(kRunFooter);

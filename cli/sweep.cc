@@ -61,13 +61,13 @@ void CheckShards(const SweepOptions& options) {
                                             " runs; expected a run for each shard");
 }
 
-/// Common inputs of both kinds of sweep.
+/// Inputs that both kinds of sweep need.
 struct Task {
   const SweepArguments& arguments;
   const Config& config;
   const PluginHost& host;
   const std::filesystem::path& path;
-  const std::string& inputs;  ///< the text of inputs.json
+  const std::string& inputs;  ///< text of inputs.json
   Progress& progress;
 };
 
@@ -101,7 +101,7 @@ ExitCode SweepValues(const Task& task, SweepOptions options) {
   return FinishSweep(*folder, task.path, sweep, task.config, task.arguments.quiet);
 }
 
-/// Returns true if `folder` is a finished sweep of this config and these inputs, for --resume.
+/// For --resume: returns true if `folder` is a finished sweep of this config and these inputs.
 /// Error: kCannotCreate if the folder was made from other inputs.
 bool IsFinished(const std::filesystem::path& folder, const Config& config,
                 const std::string& inputs) {
@@ -115,8 +115,8 @@ bool IsFinished(const std::filesystem::path& folder, const Config& config,
                   "; to replace it, leave out --resume and add --force");
 }
 
-/// Returns the config of the runs, or one config for each varied value. It omits values that cannot
-/// be set; the sweep reports them.
+/// Returns the config of the runs, or one config for each varied value. Omits values that cannot be
+/// set; the sweep reports those.
 std::vector<Config> ConfigsOf(const SweepArguments& arguments, const Config& config) {
   if (arguments.vary.empty()) return {config};
   const Variation variation = Variation::FromText(arguments.vary);
@@ -132,7 +132,7 @@ std::vector<Config> ConfigsOf(const SweepArguments& arguments, const Config& con
   return configs;
 }
 
-/// Returns the options that affect the bytes of the folder.
+/// Returns the options that affect the contents of the folder.
 std::vector<std::string> ArgumentsOf(const SweepArguments& arguments) {
   const SweepOptions& options = arguments.options;
   std::vector<std::string> list = {"sweep", "--runs", std::to_string(options.runs), "--first-seed",
@@ -184,7 +184,7 @@ void AddSweep(CLI::App& program, Action& action) {
       ->check(IsInteger(1, 1'000'000));
   command
       .add_option("--first-seed", arguments->options.first_seed,
-                  "first seed; the others count up from it; default 1")
+                  "use the seeds S, S + 1, ...; default 1")
       ->option_text("S")
       ->check(IsInteger(0, std::int64_t{1} << 62));
   command
@@ -209,7 +209,7 @@ void AddSweep(CLI::App& program, Action& action) {
   command.add_flag("--force", arguments->force, "replace the folder if it exists");
   command
       .add_flag("--resume", arguments->resume,
-                "continue an ended sweep from FOLDER.partial: add the missing runs")
+                "continue a sweep that was stopped, in FOLDER.partial: add the missing runs")
       ->needs(command.get_option("--output"))
       ->excludes(command.get_option("--force"));
   command.add_flag("--quiet", arguments->quiet, "print errors only");

@@ -10,8 +10,8 @@ namespace {
 
 constexpr const char* kResume = "; --resume continues it";
 
-/// Prints the reasons of the failed runs, the first few in full, each after `prefix`. Returns true
-/// if a run failed.
+/// Prints the reasons of the first few failed runs, each after `prefix`, and the number of failed
+/// runs if there are more. Returns true if a run failed.
 bool ReportFailures(const SweepResult& result, const std::string& prefix) {
   constexpr int kShown = 5;
   int failed = 0;

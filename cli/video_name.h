@@ -6,7 +6,7 @@
 
 namespace alidade::cli {
 
-/// Validator of CLI11: accepts the name of an AVI file.
+/// Validates an option for CLI11: returns "" for the name of an AVI file, else an error text.
 inline std::string IsAvi(const std::string& name) {
   if (std::filesystem::path(name).extension() == ".avi") return {};
   return "'" + name + "' is not the name of an AVI file; expected a name such as video.avi";

@@ -194,7 +194,7 @@ TEST_F(BundleTracksCli, CountsFramesWithoutAPose) {
   const Outcome made = Bundle("data/tracks.csv", "start.tum", {"-o", "out"});
   EXPECT_EQ(made.code, 0) << made.err;
   EXPECT_TRUE(Contains(made.out, "tracks: 5 cameras, ")) << made.out;
-  EXPECT_TRUE(Contains(made.out, "; 10 frames without a pose left out")) << made.out;
+  EXPECT_TRUE(Contains(made.out, "; 10 frames left out, because they have no pose")) << made.out;
   const std::string rows = Read("data/tracks.csv");
   const Config json = Json("out/bundle.json");
   const auto number = [&](const char* key) { return json.root().At(key).Number(); };
@@ -304,9 +304,10 @@ TEST_F(BundleCli, CountsWhatIsLeftOut) {
   Write("p.txt", "1 2 2\n0 0 1 1\n0 1 1 1\n0\n0\n0\n0\n0\n0\n500\n0\n0\n0.1\n0.1\n-3\n1\n1\n0\n");
   const Outcome made = Call({"bundle", "p.txt", "-o", "out"});
   EXPECT_EQ(made.code, 0) << made.err;
-  EXPECT_TRUE(Contains(made.out,
-                       "2 observations; 1 left out, undefined or not finite at the "
-                       "start: in the camera's plane"))
+  EXPECT_TRUE(
+      Contains(made.out,
+               "2 observations; 1 left out, because the residual is undefined or not finite at the "
+               "start: in the camera's plane"))
       << made.out;
   const Config json = Json("out/bundle.json");
   EXPECT_EQ(json.root().At("observations").Number(), 2.0);

@@ -413,7 +413,7 @@ TEST_F(Cli, DoctorTellsWhetherTheBatchIsBuilt) {
   EXPECT_EQ(Contains(doctor.out, "ok    batch estimator: ceres_batch\n"), is_built) << doctor.out;
   EXPECT_EQ(
       Contains(doctor.out,
-               "warn  the batch estimator is not built: no filter can be compared with a "
+               "warn  the batch estimator is not built: filters cannot be compared with a "
                "batch\n      remedy: apt-get install libceres-dev, then configure and build all "
                "targets\n"),
       !is_built)

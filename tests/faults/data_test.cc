@@ -360,8 +360,8 @@ TEST_F(DataFault, SignsOfATruthDoNotDependOnTheOrderOfArrival) {
 TEST_F(DataFault, ScaleThatNobodyTellsIsReportedAndNoFailure) {
   Write("tracks.csv", Plane(0, 0.0) + Plane(1, 0.01) + Plane(2, 0.02));
   const Outcome alone = Call({"explain", "map.yaml"});
-  EXPECT_TRUE(
-      Contains(alone.out, "  unobservable: scale (1 direction)\n    scale, of trajectory and map"))
+  EXPECT_TRUE(Contains(
+      alone.out, "  unobservable: scale (1 direction)\n    the prior alone determines the scale"))
       << alone.out;
   const Outcome at_infinity =
       Call({"explain", "map.yaml", "--set", "landmarks.prior.inverse_distance=0"});

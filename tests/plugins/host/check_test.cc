@@ -122,7 +122,7 @@ INSTANTIATE_TEST_SUITE_P(
               "eats_memory",
               "calls",
               {"Predict at", "std::bad_alloc; the limit of memory is 64 MB"}},
-        Fault{0, "singular_noise", "noise", {"R is singular: smallest eigenvalue"}},
+        Fault{0, "singular_noise", "noise", {"R is singular: the smallest eigenvalue"}},
         Fault{0, "no_noise", "noise", {"R is singular: the noise is 0 for z.second"}},
         Fault{0, "writes_and_fails", "failure", {"Predict at", "fails, but writes an output"}},
         Fault{0, "strange_status", "calls", {"returned 77, which is not a valid status"}},

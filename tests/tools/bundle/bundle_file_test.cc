@@ -207,7 +207,7 @@ TEST_F(BundleFiles, RefusesBadLibmv) {
   ExpectBad(bad, {"byte 2: the focal length is not positive"});
   bad = good;
   bad[1] = 'N';
-  ExpectBad(bad, {"byte 1: markers in normalised coordinates"});
+  ExpectBad(bad, {"byte 1: the markers are in normalised coordinates"});
   ExpectBad(good.substr(0, good.size() - 2), {"byte 128: the file ends before a marker"});
   ExpectBad(good + "x", {"byte 130: there are data after the last marker"});
   bad = good;

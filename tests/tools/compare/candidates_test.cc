@@ -74,7 +74,7 @@ TEST(CompareRuns, HoldsAnEstimatorAgainstTheBatchOfItsSensors) {
   EXPECT_EQ(Find(comparison, "scale").final_reference, "");
   EXPECT_FALSE(Find(comparison, "scale").values.contains("final_difference:p.x"));
   EXPECT_EQ(comparison.notes, (std::vector<std::string>{"'scale' has no reference: no batch "
-                                                        "uses its sensors"}));
+                                                        "uses the same sensors"}));
   const std::string text = CompareReport(comparison, TableStyle::kText);
   EXPECT_NE(text.find("ratios and differences relative to the reference of each column"), text.npos)
       << text;

@@ -80,7 +80,7 @@ TEST(EvaluationWarnings, FewMatchesAreTold) {
   for (std::size_t i = 0; i < 60; ++i) estimate.timestamps[i] += i % 4 == 0 ? 0 : 30'000'000;
   EXPECT_EQ(WarningsOf(Curve(60), estimate),
             "estimate.tum: 15 of 60 possible poses match within 0.01 s; expected the same clock "
-            "and rate; --t-offset, --t-max-diff\n");
+            "and rate, or the options --t-offset and --t-max-diff\n");
 }
 
 TEST(EvaluationWarnings, AConstantTimeOffsetIsToldWithTheOptionThatTakesIt) {

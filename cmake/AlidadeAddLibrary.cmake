@@ -2,10 +2,11 @@
 
 # alidade_unity(TARGET COUNT SANITIZED)
 #
-# If ALIDADE_UNITY is set, compiles up to COUNT sources of a folder as one translation unit. Headers
-# are then read once and templates instantiated once, which saves a quarter to a third of the CPU
-# time. With sanitizers, the limit is SANITIZED, because a source then needs twice the memory.
-# Without them, GCC may use 1 GiB before it collects garbage, which saves a tenth of the time.
+# If ALIDADE_UNITY is set, compiles up to COUNT sources of a folder as one translation unit. The
+# compiler then reads each header once and instantiates each template once, which saves a quarter to
+# a third of the CPU time. If sanitizers are used, SANITIZED replaces COUNT, because each source
+# then needs twice the memory. Without sanitizers, GCC may use 1 GiB before it collects garbage,
+# which saves a tenth of the time.
 function(alidade_unity target count sanitized)
   if(NOT ALIDADE_UNITY)
     return()
@@ -34,8 +35,8 @@ endfunction()
 
 # alidade_add_library(NAME SOURCES file... HEADERS file...)
 #
-# Adds the shared library alidade::NAME of this folder, libalidade-NAME, which exports the names in
-# exports.map. HEADERS are the installed headers, relative to the folder.
+# Adds the shared library libalidade-NAME of this folder, as the target alidade::NAME. The library
+# exports only the names in exports.map. HEADERS are the installed headers, relative to the folder.
 function(alidade_add_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HEADERS")
   set(target alidade_${name})

@@ -2,12 +2,13 @@
 
 # alidade_add_plugin(NAME SOURCES file... [CPP] [FOLDER folder] [LIBRARIES target...])
 #
-# Builds a plugin that alidade loads at run time, with hidden visibility and without instruction-set
-# flags. A C-ABI plugin (models) needs only the headers. A C++ plugin (CPP; sources, estimators)
-# links alidade::core and loads only into an alidade with the same ABI number. alidade searches only
-# the FOLDER `plugins`; it loads a plugin in another folder on demand.
+# Builds a plugin that alidade loads at run time. Symbols have hidden visibility, and no
+# instruction-set flags are set. A C-ABI plugin, which provides models, needs only the headers. With
+# CPP, builds a C++ plugin, which provides sources or estimators. It links alidade::core, and only
+# an alidade with the same ABI number loads it. alidade searches only the FOLDER `plugins`, and
+# loads plugins in other folders on demand.
 #
-# Without optimisation a plugin is many times slower. If neither CMAKE_BUILD_TYPE nor
+# A plugin without optimisation is many times slower. If neither CMAKE_BUILD_TYPE nor
 # CMAKE_CXX_FLAGS sets an optimisation level, the plugin is compiled with -O2.
 function(alidade_add_plugin name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "CPP" "FOLDER" "SOURCES;LIBRARIES")

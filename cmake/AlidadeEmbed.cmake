@@ -2,8 +2,8 @@
 
 # alidade_embed(TARGET NAME FILE HEADER)
 #
-# Adds the text of FILE to TARGET as alidade::internal::NAME, which HEADER declares. The text of the
-# first line, the licence, is removed. A change of FILE triggers a new configuration.
+# Adds the text of FILE to TARGET as alidade::internal::NAME, which HEADER declares. The first line,
+# which contains the licence, is omitted. If FILE changes, CMake configures the project again.
 function(alidade_embed target name file header)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${file})
   file(READ ${file} text)

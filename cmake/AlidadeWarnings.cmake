@@ -2,9 +2,10 @@
 
 # alidade_warnings(TARGET)
 #
-# Sets the warning options of all targets of this project. GCC 12 has two false warnings: overlaps
-# in `"text" + std::string` (-Wrestrict, GCC bug 105651), and with sanitizers uninitialised members
-# of std::regex (-Wmaybe-uninitialized; see -fsanitize in its manual).
+# Sets the warning options of all targets of this project. GCC 12 prints two false warnings. One is
+# about overlaps in `"text" + std::string` (-Wrestrict, GCC bug 105651). The other occurs with
+# sanitizers and is about uninitialised members of std::regex (-Wmaybe-uninitialized; see -fsanitize
+# in the manual of GCC).
 function(alidade_warnings target)
   set(old_gcc $<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>)
   target_compile_options(${target} PRIVATE

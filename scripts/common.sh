@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # shellcheck shell=bash
 #
-# Functions and settings of all scripts, which source this file in the root folder of the repository
-# under `set -o pipefail`.
+# Functions and settings that all scripts use. A script sources this file in the root folder of the
+# repository, under `set -o pipefail`.
 
 # Number of parallel compilers: at most one per processor and one per 2 GiB of memory.
 jobs=$(nproc)
@@ -15,7 +15,8 @@ if command -v ccache >/dev/null; then
   export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
 fi
 
-# Shows the last `[done/all]` of its input: on a terminal in one place, else one line per tenth.
+# Shows the progress `[done/all]` that its input reports. On a terminal the text stays in one place;
+# otherwise each tenth of the work prints one line.
 progress() {
   local line tenth=0
   while IFS= read -r line; do
@@ -30,7 +31,7 @@ progress() {
   [[ ! -t 2 ]] || printf '\r%12s\r' '' >&2
 }
 
-# Runs a command, and shows its output only if it fails.
+# Runs a command. Shows the output of the command only if the command fails.
 quietly() {
   local log
   log=$(mktemp)

@@ -3,15 +3,15 @@
 #
 # mpirun -n N scripts/cluster/mpi_shard.sh OUT CONFIG --runs R [OPTION...]
 #
-# As rank i of N (from 0), runs shard i + 1 of `alidade sweep CONFIG --runs R ...` with one thread.
-# Writes to OUT.shards. The ranks do not communicate, so OpenMPI, MPICH and `srun -n N` are
-# suitable. Merge the shards when all ranks have ended. With `&&`, this happens only if no rank was
-# stopped:
+# Runs one shard of `alidade sweep CONFIG --runs R ...` with one thread. Rank i of N, counted from
+# 0, runs shard i + 1. Writes to OUT.shards. The ranks do not communicate, so OpenMPI, MPICH and
+# `srun -n N` are suitable. Merge the shards when all ranks have ended. If the two commands are
+# joined by `&&`, the merge runs only if no rank was stopped:
 #
 #   mpirun -n 64 scripts/cluster/mpi_shard.sh runs/big config.yaml --runs 10000 &&
 #     alidade merge runs/big.shards/* -o runs/big
 #
-# A second call resumes the sweep. ALIDADE is the program; default: alidade.
+# A second call resumes the sweep. The variable ALIDADE names the program; default: alidade.
 set -euo pipefail
 
 rank=${OMPI_COMM_WORLD_RANK:-${PMI_RANK:-${SLURM_PROCID:-}}}
@@ -31,9 +31,9 @@ trap 'kill -TERM $program 2>/dev/null || true' INT TERM
 while true; do
   code=0
   wait "$program" || code=$?
-  kill -0 "$program" 2>/dev/null || break # else a signal interrupted `wait`
+  kill -0 "$program" 2>/dev/null || break # otherwise a signal interrupted `wait`
 done
-# Code 1: some runs failed, but the shard is complete. A code of 0 prevents that mpirun ends the
-# other ranks.
+# Code 1 means that some runs failed, but the shard is complete. This script then exits with 0, so
+# mpirun does not end the other ranks.
 ((code != 1)) || code=0
 exit "$code"

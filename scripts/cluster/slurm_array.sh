@@ -4,14 +4,14 @@
 # scripts/cluster/slurm_array.sh [OPTION OF SBATCH...] -- SHARDS OUT CONFIG --runs N [OPTION...]
 #
 # Submits `alidade sweep CONFIG --runs N ...` to Slurm: an array job with one task for each of
-# SHARDS shards, and a job that merges them into OUT after all tasks have ended. Both jobs use the
-# options of sbatch:
+# SHARDS shards, and a job that merges the shards into OUT after all tasks have ended. Both jobs use
+# the options of sbatch:
 #
 #   scripts/cluster/slurm_array.sh --cpus-per-task=4 -- 16 runs/big config.yaml --runs 10000
 #
 # Writes shards and logs to OUT.shards. If a task is stopped, killed or requeued, its finished runs
-# remain. Submit the same command again to complete the others. ALIDADE is the program; default:
-# alidade.
+# remain. Submit the same command again to complete the others. The variable ALIDADE names the
+# program; default: alidade.
 set -euo pipefail
 alidade=${ALIDADE:-alidade}
 
@@ -30,14 +30,16 @@ submit() {
   mkdir -p "$out.shards"
   array=$(sbatch --parsable --job-name=sweep --array="1-$shards" --requeue --open-mode=append \
     --output="$out.shards/%a.log" "${options[@]}" "$0" --task "$shards" "$out" "$@")
-  array=${array%%;*} # the ID in `ID;CLUSTER`
-  # afterany: `alidade merge` reports missing and unfinished shards.
+  array=${array%%;*} # the job ID, without `;CLUSTER`
+  # The dependency is `afterany`, because `alidade merge` reports missing and unfinished shards
+  # itself.
   merge=$(sbatch --parsable --job-name=merge --dependency="afterany:$array" --open-mode=append \
     --output="$out.shards/merge.log" "${options[@]}" "$0" --merge "$shards" "$out")
   echo "submitted: shards $array, merge ${merge%%;*}"
 }
 
-# exec: signals of Slurm, for example before the end of the time limit, must reach the program.
+# `exec` replaces the shell, so signals of Slurm reach the program, for example before the time
+# limit ends.
 case ${1:-} in
   --task)
     shards=$2 out=$3

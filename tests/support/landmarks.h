@@ -25,10 +25,9 @@ inline const Blocks kPose{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}};
 /// Calls f(Representation{}) for each representation.
 template <class F>
 void ForEachRepresentation(const F& f) {
-  for (const auto representation :
-       {LandmarkRepresentation::kInverseDepth, LandmarkRepresentation::kAnchored,
-        LandmarkRepresentation::kXyz}) {
-    SCOPED_TRACE(kLandmarkRepresentations[static_cast<std::size_t>(representation)]);
+  for (std::size_t i = 0; i < kLandmarkRepresentations.size(); ++i) {
+    const auto representation = static_cast<LandmarkRepresentation>(i);
+    SCOPED_TRACE(kLandmarkRepresentations[i]);
     WithRepresentation(representation, f);
   }
 }

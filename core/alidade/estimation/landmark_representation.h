@@ -30,7 +30,7 @@ inline constexpr int kMaxLandmarkTangent = 6;
 /// Position of a landmark, and the Jacobian of the position.
 struct LandmarkPoint {
   Eigen::Vector3d position;  ///< in the world, m
-  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 6>
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, kMaxLandmarkTangent>
       jacobian;  ///< derivative by the tangent elements of all blocks
 };
 

@@ -26,8 +26,8 @@ struct Jet {
   T v[N]{};  ///< derivatives
 
   constexpr Jet() = default;
-  constexpr Jet(const T& value)
-      : a(value) {}  // NOLINT(google-explicit-constructor): converts a constant
+  // NOLINTNEXTLINE(google-explicit-constructor): converts a constant
+  constexpr Jet(const T& value) : a(value) {}
   /// Constructs the variable with the index k.
   constexpr Jet(const T& value, int k) : a(value) { v[k] = T(1); }
 

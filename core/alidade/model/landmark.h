@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <type_traits>
 
 #include "alidade/model/autodiff.h"
 #include "alidade/model/jet.h"
@@ -142,6 +143,24 @@ using LandmarkRepresentations = std::tuple<InverseDepth, Anchored, Xyz>;
 
 namespace detail {
 
+constexpr bool IsSameText(const char* a, const char* b) {
+  while (*a != '\0' && *a == *b) ++a, ++b;
+  return *a == *b;
+}
+
+/// Returns true if two representations have the same blocks, by name and geometry, so that a sensor
+/// cannot be recognised by its roles.
+template <class A, class B>
+constexpr bool HaveSameRoles() {
+  if constexpr (std::is_same_v<typename A::Spaces, typename B::Spaces>) {
+    for (std::size_t i = 0; i < A::kRoles.size(); ++i) {
+      if (!IsSameText(A::kRoles[i].name, B::kRoles[i].name)) return false;
+    }
+    return true;
+  }
+  return false;
+}
+
 template <class List>
 struct RepresentationTraits;
 template <class... Representations>
@@ -149,6 +168,14 @@ struct RepresentationTraits<std::tuple<Representations...>> {
   static constexpr std::array<const char*, sizeof...(Representations)> kNames{
       Representations::kName...};
   static constexpr int kMaxTangent = std::max({Blocks<Representations>::kTangent...});
+
+  /// Returns the number of representations that have the roles of R.
+  template <class R>
+  static constexpr int CountWithRolesOf() {
+    return (HaveSameRoles<R, Representations>() + ...);
+  }
+  static_assert(((CountWithRolesOf<Representations>() == 1) && ...),
+                "two representations have the same roles: give one a role with another name");
 
   /// Calls f(Representation{}) for the representation with this index.
   template <class F>

@@ -45,9 +45,8 @@ void DifferentiatePlus(const double* x, const double* d, double* j) {
   G::Plus(x, dual_d, y);
   for (int i = 0; i < G::kAmbient; ++i) base[i] = y[i].a;
   G::Minus(y, base, difference);
-  for (int i = 0; i < G::kTangent; ++i) {
-    for (int k = 0; k < G::kTangent; ++k) j[i * G::kTangent + k] = difference[i].v[k];
-  }
+  for (int i = 0; i < G::kTangent; ++i)
+    std::copy_n(difference[i].v, G::kTangent, j + i * G::kTangent);
 }
 
 /// Entry of the table for the struct G of alidade/model/geometry.h.

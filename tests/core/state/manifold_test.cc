@@ -391,7 +391,9 @@ TEST(GeometryTable, DerivativesInClosedFormAreThoseOfPlus) {
   const auto visit = [&]<class G>(G) {
     const Geometry geometry = Geometry::Of<G>();
     std::vector<double> x = geometry.Identity();
-    const double turn[3] = {0.4, -0.7, 0.2}, d[3] = {-0.3, 1.1, 0.6};
+    static_assert(detail::kMaxTangent <= 6);
+    const double turn[6] = {0.4, -0.7, 0.2, 0.5, -0.1, 0.3},
+                 d[6] = {-0.3, 1.1, 0.6, -0.2, 0.4, 0.9};
     geometry.Plus(x.data(), turn, x.data());
     std::array<double, detail::kMaxTangent * detail::kMaxTangent> closed{}, dual{};
     PlusJacobian(geometry, x.data(), d, closed.data());

@@ -221,7 +221,7 @@ class CsvSource : public Source {
     const double t_s = value * std::pow(10.0, static_cast<double>(layout_.time_digits) - 9.0);
     if (!(std::abs(t_s) < cell::kTimeLimit)) {
       FailCell(column, "is beyond 292 years",
-               "-9.2e9 s to 9.2e9 s, or the unit of the column, as in 'source.time: {unit: ns}'");
+               "-9.2e9 s to 9.2e9 s, or another unit, such as 'source.time: {unit: ns}'");
     }
     const Timestamp timestamp =
         cell::ParseTimestamp(cell::Trim(cells_[column.index]), value, layout_.time_digits);
@@ -231,7 +231,8 @@ class CsvSource : public Source {
       const bool is_earlier = timestamp < last_timestamp_;
       FailCell(
           column,
-          (is_earlier ? "is before line " : "is equal to line ") + std::to_string(last_line_),
+          (is_earlier ? "is earlier than in line " : "is the same time as in line ") +
+              std::to_string(last_line_),
           is_earlier
               ? "increasing times, or 'out_of_sequence.policy: buffer' or 'rollback'"
               : "increasing times, or 'time.repeats: true', which joins rows of one time into a "

@@ -80,7 +80,7 @@ void ReadBlind(const Node& entry, CsvLayout& layout) {
   const std::optional<Node> after = entry.Find("blind_after");
   const std::optional<Node> blind = entry.Find("blind");
   if (!after) {
-    if (blind) blind->Fail("has no effect without 'blind_after'", "'blind_after' too");
+    if (blind) blind->Fail("has no effect without 'blind_after'", "'blind_after' as well");
     return;
   }
   layout.blind_after_node = after;

@@ -24,7 +24,8 @@ class DepthTarget : public Source {
     Params& p = arguments.params;
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     depth_mean_m_ = p.Positive("depth_mean_m", "m", "mean depth of the target", 0.3);
-    amplitude_m_ = p.NonNegative("amplitude_m", "m", "amplitude; below depth_mean_m", 0.1);
+    amplitude_m_ =
+        p.NonNegative("amplitude_m", "m", "amplitude of the motion; below depth_mean_m", 0.1);
     frequency_hz_ = p.NonNegative("frequency_hz", "Hz", "frequency of the motion", 0.4);
     step_s_ = 1.0 / p.Number("rate_hz", "Hz", "samples per second", {1e-6, 1e6}, 1.0 / 0.033);
     const double duration_s =
@@ -41,10 +42,10 @@ class DepthTarget : public Source {
                  "probability that a disparity is uniform from 0 to the largest (poor texture)",
                  {0.0, 1.0}, 0.0);
     const double min_range_m =
-        p.NonNegative("min_range_m", "m", "stereo measures no nearer depth; 0: no limit", 0.3);
+        p.NonNegative("min_range_m", "m", "minimum depth that stereo measures; 0: no limit", 0.3);
     blind_by_true_depth_ =
         p.Choice("blind_test", {"measured", "true_depth"},
-                 "disparity that min_range_m is compared with: noisy or exact", 0) == 1;
+                 "disparity that is compared with the limit min_range_m: noisy or exact", 0) == 1;
     const double template_px = p.Positive("template_px", "px", "width of the template", 300.0);
     const double sigma_edge_px =
         p.NonNegative("sigma_edge_px", "px", "noise of an edge of the target, 1 sigma", 1.0);

@@ -23,7 +23,7 @@ namespace alidade {
 ///   F        focal_px            px    -      400    rectified focal length
 ///   B        baseline_m          m     -      0.065  stereo baseline
 ///   sigma_d  sigma_disparity_px  px    left   1      disparity noise, 1 sigma
-///   Zn       min_range_m         m     left   0.3    stereo measures no nearer depth; 0: no limit
+///   Zn       min_range_m         m     left   0.3    minimum depth of stereo; 0: no limit
 ///   w        template_px         px    cam    300    width of the template
 ///   Z0       template_depth_m    m     cam    0.3    depth at which the template was recorded
 ///   sigma_e  sigma_edge_px      px    cam    1      noise of one edge of the target, 1 sigma

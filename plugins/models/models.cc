@@ -100,7 +100,7 @@ class Models : public Source {
     if (!overrides) return;
     for (const auto& [key, node] : overrides->Entries()) {
       if (!truth.root().HasUnread(key)) continue;
-      node.Fail("the truth has no key '" + key + "'",
+      node.Fail("the simulator does not read the key '" + key + "'",
                 "`state`, `sensors`, or a key that their models read");
     }
   }
@@ -131,7 +131,8 @@ class Models : public Source {
         constexpr double kLengthTolerance = 1e-3;
         x = value->Numbers(block.geometry().ambient);
         if (DistanceFrom(block.geometry(), x.data()) > kLengthTolerance) {
-          value->Fail("not of unit length", "a unit vector or quaternion [w, x, y, z] to 1e-3");
+          value->Fail("not of unit length",
+                      "a unit vector, or a unit quaternion [w, x, y, z], to 1e-3");
         }
         block.geometry().Normalise(x.data());
         continue;
@@ -180,7 +181,8 @@ class Models : public Source {
     for (const Motion& earlier : motions_) {
       if (earlier.stream < 0 || earlier.binding->input.stream != stream) continue;
       if (const auto duplicate = inputs ? inputs->Find(motion.binding->name) : std::nullopt) {
-        duplicate->Fail("stream '" + stream + "' also belongs to '" + earlier.binding->name + "'",
+        duplicate->Fail("stream '" + stream + "' is already simulated by the input of '" +
+                            earlier.binding->name + "'",
                         "only the input of '" + earlier.binding->name + "'");
       }
       motion.stream = earlier.stream;
@@ -197,7 +199,7 @@ class Models : public Source {
       if (const auto mean = entry->Find("mean")) motion.mean = mean->Numbers(geometry.ambient);
       if (const auto amplitude = entry->Find("amplitude")) {
         if (!geometry.is_vector()) {
-          amplitude->Fail("the input is not a vector", "only `mean`");
+          amplitude->Fail("the input is not a vector, so it has no amplitude", "only `mean`");
         }
         motion.amplitude = amplitude->Numbers(geometry.ambient);
         motion.frequency_hz = entry->At("frequency_hz", "an amplitude").Number(0.0, 1e6);
@@ -237,14 +239,15 @@ class Models : public Source {
         }
         if (sensor_settings) {
           sensor_settings->Fail(
-              "an earlier sensor has and simulates the stream '" + binding.stream + "'",
+              "an earlier sensor already simulates the stream '" + binding.stream + "'",
               "the entry of that sensor");
         }
         continue;
       }
       if (known > 0 && !sensor_settings) {
-        entry.Fail("sensor '" + binding.name + "' needs known numbers with each measurement",
-                   "sensors." + binding.name + ".known, a list of them for each measurement");
+        entry.Fail(
+            "sensor '" + binding.name + "' needs known numbers with each measurement",
+            "sensors." + binding.name + ".known, a list of these numbers for each measurement");
       }
       sensors_.push_back({&binding, ModelOf(entry, binding), static_cast<int>(streams_.size()),
                           schedule, Random(seed, 1000 + 2 * i), max_per_frame});

@@ -9,11 +9,12 @@ namespace alidade {
 
 inline constexpr const char* kModelsKeys =
     "start                 prior (default): the true state is drawn from the priors; mean: it is "
-    "their mean\n"
-    "initial               {ENTRY: {BLOCK: value}}: initial true values that replace these\n"
+    "the mean of the priors\n"
+    "initial               {ENTRY: {BLOCK: value}}: initial true values, in place of those of "
+    "`start`\n"
     "overrides             config of the truth, merged over the config of the filters\n"
     "sensors               {SENSOR: {rate_hz, missing, outliers: {share, sigma_scale}, known}}; "
-    "known: the known numbers of the sensor, a list of them for each measurement of a time step\n"
+    "known: the known numbers of the sensor, one list for each measurement of a time step\n"
     "inputs                {STATE_ENTRY: {mean, amplitude, frequency_hz}}: its control input\n"
     "landmarks             {count, box: {min, max}, max_per_frame}: points in the world, m";
 

@@ -20,9 +20,9 @@ Keyframes::Keyframes(Params& p, std::uint64_t seed) : noise_(seed, 5) {
                               "whether the pose of the previous keyframe is measured", true);
   radius_ = p.NonNegative("keyframes.closure_radius_m", "m",
                           "largest distance of a keyframe that closes a loop; 0: no closures", 0.0);
-  min_keyframes_between_ = static_cast<std::size_t>(
-      p.Integer("keyframes.closure_after",
-                "minimum number of keyframes between the two of a closure", 1, 1'000'000, 50));
+  min_keyframes_between_ = static_cast<std::size_t>(p.Integer(
+      "keyframes.closure_after",
+      "minimum number of keyframes between the two keyframes of a closure", 1, 1'000'000, 50));
 }
 
 void Keyframes::Emit(std::size_t index, const CameraState& state, int stream, std::size_t first,

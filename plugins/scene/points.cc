@@ -89,7 +89,7 @@ std::vector<Eigen::Vector3d> ReadPoints(const Node& node, Random& random) {
   const auto [kind, value] = OneOf(node, {"list", "box", "room", "shells"});
   std::vector<Eigen::Vector3d> points;
   if (kind == "list") {
-    if (count_node) count_node->Fail("a list has its own count", "only 'list'");
+    if (count_node) count_node->Fail("the number of points follows from the list", "only 'list'");
     for (const Node& item : value.Items()) points.push_back(ReadVector(item));
     if (points.empty()) value.Fail("no points", "a list of [x, y, z], m");
     return points;

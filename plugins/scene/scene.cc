@@ -112,18 +112,18 @@ class Scene : public Source {
     }
     if (measures_ == kPixel) {
       remaining_known_ = p.Integer(
-          "known_points.count",
-          "number of points whose depth is measured at their first observation", 0, 1 << 20, 0);
+          "known_points.count", "number of points with a measured depth at their first observation",
+          0, 1 << 20, 0);
       known_sigma_ =
-          p.Number("known_points.sigma_depth_relative", "", "noise of that depth, relative to it",
+          p.Number("known_points.sigma_depth_relative", "", "noise of this depth / depth, 1 sigma",
                    {0.0, 1.0, true, false}, 0.005);
     }
     if (p.Flag("simulate_odometry", "whether the source has a stream odometry", false)) {
       odometry_stream_ = 0;  // DefineStreams() sets the index
-      linear_sigma_ =
-          p.NonNegative("odometry_noise.linear_velocity", "m/s", "1 sigma, per axis", 0.0);
-      angular_sigma_ =
-          p.NonNegative("odometry_noise.angular_velocity", "rad/s", "1 sigma, per axis", 0.0);
+      linear_sigma_ = p.NonNegative("odometry_noise.linear_velocity", "m/s",
+                                    "noise of each axis, 1 sigma", 0.0);
+      angular_sigma_ = p.NonNegative("odometry_noise.angular_velocity", "rad/s",
+                                     "noise of each axis, 1 sigma", 0.0);
     }
   }
 

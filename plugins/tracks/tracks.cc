@@ -118,7 +118,7 @@ class Tracks : public Source {
       const double t_s = static_cast<double>(frame_) / options_.rate_hz;
       if (!(t_s < 9.2e9)) {
         tracks_->FailLine("frame " + std::to_string(frame_) + " is beyond 292 years",
-                          "frames that count from 0, at rate_hz");
+                          "frame numbers that count from 0 at rate_hz");
       }
       timestamp = TimestampFromSeconds(t_s);
       return true;

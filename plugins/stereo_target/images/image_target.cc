@@ -187,8 +187,8 @@ class ImageTarget : public Source {
       times_->End(left_->number() + 1);
       if (!has_started_) {
         throw Error(ExitCode::kBadData,
-                    ErrorLine(place(), {}, "the target was in none of the images",
-                              "a row of 'boxes' for an image that shows it"));
+                    ErrorLine(place(), {}, "no image showed the target",
+                              "a row of 'boxes' for an image that shows the target"));
       }
       return false;
     }

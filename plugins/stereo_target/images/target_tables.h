@@ -65,7 +65,8 @@ class BoxRows {
     for (std::size_t i = 1; i < rows_.size(); ++i) {
       const char* const name = kNames[rows_.size() == 5 ? i - 1 : i + 3];
       numbers.push_back(rows_.Number(i, name));
-      if (std::abs(numbers.back()) > 1e5) rows_.FailCell(i, name, "is outside any image", "px");
+      if (std::abs(numbers.back()) > 1e5)
+        rows_.FailCell(i, name, "is outside any image", "a position in the image, px");
     }
     if (numbers.size() == 4) {
       for (const std::size_t side : {2, 3}) {

@@ -35,14 +35,15 @@ struct TargetOptions {
             "`stereo`",
             0))),
         min_similarity(p.Number("min_similarity", "1",
-                                "the target is lost if it correlates less with its template",
-                                {-1.0, 1.0}, 0.7)),
+                                "minimum correlation of the target and its template", {-1.0, 1.0},
+                                0.7)),
         max_relative_sigma(p.Positive("max_relative_sigma", "1",
-                                      "maximum of standard deviation of the scale / scale", 0.2)),
-        refresh_similarity(p.Number("refresh_similarity", "1",
-                                    "a new template is recorded if it correlates less; each new "
-                                    "template adds its error to all later measurements",
-                                    {-1.0, 1.0}, 0.8)),
+                                      "maximum relative standard deviation of the scale", 0.2)),
+        refresh_similarity(
+            p.Number("refresh_similarity", "1",
+                     "a lower correlation with the template requires a new one; each "
+                     "new template adds its error to all later measurements",
+                     {-1.0, 1.0}, 0.8)),
         refresh_scale(p.Number("refresh_scale", "1",
                                "a new template is recorded if the target is larger or smaller by "
                                "more than this factor",

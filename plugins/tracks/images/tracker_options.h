@@ -27,17 +27,17 @@ struct TrackerOptions {
                            100'000, 100)),
         cells{p.Integer("grid_columns", "columns of the grid over which features are spread", 1,
                         1000, 8),
-              p.Integer("grid_rows", "rows of this grid", 1, 1000, 6)},
+              p.Integer("grid_rows", "rows of the grid", 1, 1000, 6)},
         distance_px(
             p.Number("distance_px", "px", "minimum distance of two features", {1.0, 1e4}, 12.0)),
         quality(p.Number("quality", "1",
                          "minimum response of a corner, relative to the strongest one of its image",
                          {0.0, 1.0, true, true}, 0.01)),
-        corner_px(
-            p.Integer("corner_px",
-                      "side of the patch for the response of a corner; larger than small marks, "
-                      "such as discs, it finds their middle",
-                      3, 101, 5)),
+        corner_px(p.Integer(
+            "corner_px",
+            "side of the patch for the response of a corner; if it is larger than a mark, "
+            "such as a disc, the middle of the mark is found",
+            3, 101, 5)),
         window_px(p.Integer("window_px", "side of the tracked patch", 5, 101, 21)),
         levels(p.Integer("pyramid_levels", "halved images above the image itself", 0, 10, 3)),
         forward_backward_px(p.Positive(

@@ -109,18 +109,19 @@ TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
 // Faults 35 and 36 of tests/faults/README.md.
 TEST_F(Csv, TimeMustIncrease) {
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n# c\n0.1,1,2,3\n",
-                "FILE:5:1 t_s: '0.1' is before line 3; expected increasing times, or "
+                "FILE:5:1 t_s: '0.1' is earlier than in line 3; expected increasing times, or "
                 "'out_of_sequence.policy: buffer' or 'rollback'");
-  ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n0.2000000001,1,2,3\n",
-                "FILE:4:1 t_s: '0.2000000001' is equal to line 3; expected increasing times, "
-                "or 'time.repeats: true', which joins rows of one time into a frame, or "
-                "'out_of_sequence.policy: buffer', which joins rows of different streams");
+  ExpectBadData(
+      std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n0.2000000001,1,2,3\n",
+      "FILE:4:1 t_s: '0.2000000001' is the same time as in line 3; expected increasing times, "
+      "or 'time.repeats: true', which joins rows of one time into a frame, or "
+      "'out_of_sequence.policy: buffer', which joins rows of different streams");
 }
 
 TEST_F(Csv, TimeBeyondTheTimestamps) {
   ExpectBadData(std::string(kHeader) + "9.3e9,1,2,3\n",
-                "FILE:2:1 t_s: '9.3e9' is beyond 292 years; expected -9.2e9 s to 9.2e9 s, or the "
-                "unit of the column, as in 'source.time: {unit: ns}'");
+                "FILE:2:1 t_s: '9.3e9' is beyond 292 years; expected -9.2e9 s to 9.2e9 s, or "
+                "another unit, such as 'source.time: {unit: ns}'");
   ExpectBadData(std::string(kHeader) + ",1,2,3\n",
                 "FILE:2:1 t_s: '' is not a number; expected a finite number");
 }

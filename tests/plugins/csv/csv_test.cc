@@ -108,7 +108,7 @@ TEST_F(Csv, AFrameBeforeABadRowIsGivenOutWhereItIsWhole) {
   ExpectError(ExitCode::kBadData, "FILE:4:3 r: 'x' is not a number; expected a finite number",
               [&] { source->Next(frame); });
   ExpectBadData("t_s,r\n1,21\n0,22\n",
-                "FILE:3:1 t_s: '0' is before line 2; expected increasing times, or "
+                "FILE:3:1 t_s: '0' is earlier than in line 2; expected increasing times, or "
                 "'out_of_sequence.policy: buffer' or 'rollback'",
                 "path: a.csv\ntime: {column: t_s, repeats: true}\nstreams: {range: r}\n");
   Write("t_s,r\n0,21\nO,22\n");
@@ -281,7 +281,7 @@ TEST_F(Csv, BlindNamesTheStreams) {
                   "inverse_scale; did you mean 'disparity'?");
   ExpectBadConfig(kDepthConfig + std::string("blind: disparity\n"),
                   "run.yaml:4:8 blind: has no effect without 'blind_after'; expected "
-                  "'blind_after' too");
+                  "'blind_after' as well");
 }
 
 TEST_F(Csv, BlindAfterNeedsRowsInTheOrderOfTime) {

@@ -300,7 +300,7 @@ TEST(Models, RefusesByKeyAndRemedy) {
   EXPECT_NE(message.find("source.initial: {target: {position: value}}"), std::string::npos);
   for (const char* overrides : {"sensor: {stereo: {sigma_px: 2}}", "source: {rate_hz: 1}"}) {
     const std::string why = Refusal(source + "overrides: {" + overrides + "}}");
-    EXPECT_NE(why.find("the truth has no key 's"), std::string::npos) << why;
+    EXPECT_NE(why.find("the simulator does not read the key 's"), std::string::npos) << why;
   }
 }
 

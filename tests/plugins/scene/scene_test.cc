@@ -266,7 +266,8 @@ TEST(Scene, RefusesWhatMakesNoScene) {
   refused(kStill + ", points: {bix: 3}", "points.bix: unknown key; did you mean 'box'?");
   refused(kStill + ", points: {count: 3}",
           "points: the kind is missing; expected one of list, box, room, shells");
-  refused(kStill + ", points: {list: [[1, 2, 3]], count: 3}", "points.count: a list has its own");
+  refused(kStill + ", points: {list: [[1, 2, 3]], count: 3}",
+          "points.count: the number of points follows from the list");
   refused(kStill + ", points: {list: [[1, 2]]}", "points.list[0]");
   refused(kStill + ", points: {box: {min: [0, 0, 0], max: [1, 0, 1]}, count: 3}",
           "points.box.max: not above 'min' in x, y and z");

@@ -52,8 +52,8 @@ TEST_F(TracksTest, Fault30Overflow) {
 
 TEST_F(TracksTest, Fault30AFrameBeyondAllTimes) {
   ExpectBadData("99999999999999,3,0,1\n99999999999999,3,1,1\n",
-                "DIR/tracks.csv:1: frame 99999999999999 is beyond 292 years; expected frames that "
-                "count from 0, at rate_hz");
+                "DIR/tracks.csv:1: frame 99999999999999 is beyond 292 years; expected frame "
+                "numbers that count from 0 at rate_hz");
 }
 
 TEST_F(TracksTest, Fault31NegativeFrame) {

@@ -164,7 +164,8 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   SweepOptions options = arguments.options;
   bool is_reported = arguments.quiet;
   options.progress = [&](std::int64_t done, std::int64_t total) {
-    if (!std::exchange(is_reported, true)) ReportOutput(output);  // the config is valid
+    // Not earlier, because only now the config is known to be valid.
+    if (!std::exchange(is_reported, true)) ReportOutput(output);
     progress.Show(done, total);
   };
   options.stop = StopRequested;

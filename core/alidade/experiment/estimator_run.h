@@ -28,7 +28,8 @@ struct EstimatorRun {
   bool needs_reference = false;  ///< true if the metrics need the estimates of the reference
   std::vector<Estimate> estimates = {};  ///< filled only if needs_reference is true
   std::int64_t stale_inputs = 0;         ///< total number of events `input_stale`
-  /// By sensor: nonzero if it failed; empty unless OnPluginFailure::kDisable.
+  /// One element per sensor, nonzero if the sensor has failed. Empty unless
+  /// OnPluginFailure::kDisable.
   std::vector<char> failed_sensors = {};
 
   /// Result of processing a frame: the estimator after the frame, with its report.

@@ -32,8 +32,8 @@ enum class MetricReduction { kMean, kRootMean, kMax, kLast };
 /// Section of a comparison that shows a metric.
 enum class MetricSection {
   kNone,
-  kAlong,  ///< over the run
-  kFinal,  ///< at the end of the run
+  kAlong,  ///< value over the run
+  kFinal,  ///< value at the end of the run
 };
 
 /// Error of a block at one timestamp.
@@ -81,7 +81,7 @@ struct MetricInfo {
   int priority = 0;  ///< order among the ten main rows of `run`, from 1; 0: not a main row
 
   MetricSection section = MetricSection::kNone;
-  const char* label = "";  ///< label in a comparison
+  const char* label = "";  ///< name of the metric in a comparison
   bool is_main = false;    ///< true if the short form of a comparison also shows it
   bool has_ratio = false;  ///< true if a comparison shows its ratio to the reference
   bool is_ratio = false;   ///< true if the metric is itself a ratio of means over the runs

@@ -187,17 +187,17 @@ struct Metrics::Impl {
 
   std::vector<TrackedBlock> tracked_blocks;
   std::vector<Owner> owners;
-  std::vector<std::string> sensors, motions;   ///< names of both
-  std::map<int, ImpliedBlock> implied_blocks;  ///< by sensor
+  std::vector<std::string> sensors, motions;   ///< names of sensors and motion models
+  std::map<int, ImpliedBlock> implied_blocks;  ///< key: index of the sensor
   bool has_landmarks = false, has_ransac = false;
   /// Number of accepted and gated measurements of a sensor, and the number of those that are far
   /// off.
   struct FarOffCounts {
     std::int64_t total = 0, far_off = 0;
   };
-  std::vector<FarOffCounts> far_off_counts;  ///< by sensor
-  std::vector<bool> measures_angle;          ///< by sensor
-  std::vector<NisSamples> nis_samples;       ///< by sensor
+  std::vector<FarOffCounts> far_off_counts;  ///< one element per sensor
+  std::vector<bool> measures_angle;          ///< one element per sensor
+  std::vector<NisSamples> nis_samples;       ///< one element per sensor
   std::int64_t report_count = 0;
   std::map<int, std::vector<double>> reprojection;  ///< rms of each frame, by sensor
   std::vector<PeriodSums> periods;  ///< element 0 is the whole run; the segments follow

@@ -90,7 +90,7 @@ class RunObserver {
 
 /// Options of a run.
 struct RunOptions {
-  std::vector<RunObserver*> observers;  ///< called in this order
+  std::vector<RunObserver*> observers;  ///< observers, which are called in this order
   /// Receives the frames processed and their total, or -1.
   std::function<void(std::int64_t, std::int64_t)> progress;
   std::function<bool()> stop;  ///< returns true to stop after the current frame

@@ -10,7 +10,7 @@ namespace alidade::internal {
 namespace {
 
 std::string_view LastComponent(std::string_view name) {
-  return name.substr(name.rfind('.') + 1);  // npos + 1 = 0
+  return name.substr(name.rfind('.') + 1);  // without a dot, npos + 1 is 0
 }
 
 }  // namespace

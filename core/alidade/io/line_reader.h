@@ -83,7 +83,8 @@ class LineReader {
 
  private:
   static constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  static constexpr std::size_t kMaxBytes = kMaxLine + kByteOrderMark.size() + 1;  // 1: '\r'
+  // The 1 is for '\r'.
+  static constexpr std::size_t kMaxBytes = kMaxLine + kByteOrderMark.size() + 1;
 
   /// Moves a line of `length` bytes from the buffer to `line`. Returns true.
   bool ExtractLine(std::size_t length, bool is_unterminated, std::string_view& line) {

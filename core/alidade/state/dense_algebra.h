@@ -11,10 +11,10 @@
 /// build time.
 namespace alidade::internal {
 
-Eigen::MatrixXd Product(const ConstMatrix& a, const ConstMatrix& b);            ///< A B
-Eigen::MatrixXd ProductTransposed(const ConstMatrix& a, const ConstMatrix& b);  ///< A B'
-Eigen::MatrixXd TransposedProduct(const ConstMatrix& a, const ConstMatrix& b);  ///< A' B
-Eigen::MatrixXd Congruence(const ConstMatrix& a, const ConstMatrix& p);         ///< A P A'
+Eigen::MatrixXd Product(const ConstMatrix& a, const ConstMatrix& b);            ///< returns A B
+Eigen::MatrixXd ProductTransposed(const ConstMatrix& a, const ConstMatrix& b);  ///< returns A B'
+Eigen::MatrixXd TransposedProduct(const ConstMatrix& a, const ConstMatrix& b);  ///< returns A' B
+Eigen::MatrixXd Congruence(const ConstMatrix& a, const ConstMatrix& p);         ///< returns A P A'
 
 /// Returns X with A X = B; A is square and not singular.
 Eigen::MatrixXd SolveSquare(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
@@ -47,8 +47,8 @@ Eigen::VectorXd EigenvaluesOf(const Eigen::MatrixXd& symmetric);
 /// Least-squares solution x, which minimises |A x - b|. A = Q R is m x n, m >= n, and has full
 /// rank.
 struct LeastSquares {
-  Eigen::MatrixXd r;            ///< n x n, upper triangular
-  Eigen::VectorXd x;            ///< n
+  Eigen::MatrixXd r;            ///< R, n x n, upper triangular
+  Eigen::VectorXd x;            ///< solution, n
   Eigen::VectorXd q_adjoint_b;  ///< Q' b, m
 };
 LeastSquares SolveLeastSquares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);

@@ -16,7 +16,7 @@ namespace alidade {
 /// Entry of the table of geometries: the properties of a geometry, and its functions for doubles.
 /// The entries of a vector and a product have no functions, because the model determines the sizes.
 struct GeometryRow {
-  std::uint32_t number = 0;  ///< number in the C table
+  std::uint32_t number = 0;  ///< number of the geometry in the C table
   const char* name = "";
   const char* elements = "";          ///< comma-separated element names of a value; "": numbers
   const char* tangent_elements = "";  ///< element names of a difference; "": same as `elements`
@@ -28,7 +28,8 @@ struct GeometryRow {
   void (*minus)(const double* y, const double* x, double* d) = nullptr;
   void (*normalise)(double* x) = nullptr;
   double (*distance)(const double* x) = nullptr;  ///< null: every x lies on the manifold
-  void (*transport)(const double* x, const double* y, double* j) = nullptr;  ///< null: identity
+  /// Null: the transport matrix is the identity.
+  void (*transport)(const double* x, const double* y, double* j) = nullptr;
   void (*plus_jacobian)(const double* x, const double* d, double* j) = nullptr;
 };
 

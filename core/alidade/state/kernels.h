@@ -30,8 +30,8 @@ struct SymmetricView {
 /// Measurement of an update, linearised about the state.
 struct MeasurementRows {
   JacobianRows h;
-  const double* innovation;  ///< m
-  const double* noise;       ///< R, m x m
+  const double* innovation;  ///< innovation, m
+  const double* noise;       ///< noise covariance R, m x m
   double* s;                 ///< m x m, output of Kernels::nis: S = H P H' + R
   int column = 0;            ///< first column of this measurement in P H' of the update
 };
@@ -52,9 +52,9 @@ struct Update {
   int panel_rows;
   double* w;                  ///< P H', later W; PaddedSize(n) x capacity
   double* s;                  ///< S, later L, column-major; PaddedSize(capacity) x capacity
-  double* inverse_d;          ///< capacity
+  double* inverse_d;          ///< reciprocals of D; size `capacity`
   double* y;                  ///< L^-1 r; size `capacity`
-  double* dx;                 ///< PaddedSize(n)
+  double* dx;                 ///< correction of the state; size PaddedSize(n)
   double* variance_decrease;  ///< diagonal of W D^-1 W'; size PaddedSize(n)
   double* gain;               ///< K, of the same size as w; null if K is not needed
 

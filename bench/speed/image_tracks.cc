@@ -209,7 +209,8 @@ int Main(int argc, char** argv) {
   for (int k = 0; scene->Next(frame); ++k) {
     GreyImage grey_image = scene->Draw(0);
     const cv::Mat image(grey_image.height, grey_image.width, CV_8UC1, grey_image.pixels.data());
-    if (!cv::imwrite(FileOf(temporary.path(), k), image)) throw std::runtime_error("cannot write");
+    if (!cv::imwrite(FileOf(temporary.path(), k), image))
+      throw std::runtime_error("cannot write an image of the example");
   }
   Config config = Config::FromFile(example + "/config.yaml");
   config.Set("source.path", temporary.path().string(), "bench");

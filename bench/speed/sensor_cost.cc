@@ -331,12 +331,12 @@ int Main(int rounds) {
                 "ms/iteration", "ns/cost", "ratio (10 % to 90 %)");
     for (std::size_t i = 0; i < times.size(); ++i) {
       if (std::abs(adjustments[i]->cost() / adjustments[0]->cost() - 1.0) > 1e-6) {
-        std::fprintf(stderr, "error: %s ends at cost %.12g, by hand at %.12g\n",
+        std::fprintf(stderr, "error: %s ends at the cost %.12g, the costs by hand at %.12g\n",
                      contenders.all[i].name, adjustments[i]->cost(), adjustments[0]->cost());
         return 1;
       }
       if (adjustments[i]->jacobian_evaluations() != adjustments[0]->jacobian_evaluations()) {
-        std::fprintf(stderr, "error: %s evaluates Jacobians %d times, by hand %d times\n",
+        std::fprintf(stderr, "error: %s evaluates Jacobians %d times, the costs by hand %d times\n",
                      contenders.all[i].name, adjustments[i]->jacobian_evaluations(),
                      adjustments[0]->jacobian_evaluations());
         return 1;
@@ -358,7 +358,7 @@ int main(int argc, char** argv) {
       "Time of an iteration of Ceres on costs made from sensor models, relative to others."};
   int rounds = 15;
   app.add_option("--rounds", rounds,
-                 "Comparisons of each contender with its peer: two solves of three iterations each")
+                 "Number of comparisons of each contender with its peer, of two solves each")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);

@@ -48,7 +48,7 @@ class CalibrationFile {
   }
 
   /// Returns the text of the file, in which blanks replace the directive and the tags of OpenCV.
-  /// These are not YAML.
+  /// The directive and the tags are not YAML.
   static std::string PlainYaml(const std::filesystem::path& file) {
     std::string text = internal::ReadFile(file, [&](ExitCode code, int error) {
       throw Error(code, ErrorLine({file.string()}, {}, std::strerror(error)));

@@ -24,8 +24,9 @@ double LatticeValue(std::uint64_t texture, std::uint64_t octave, std::int64_t x,
 }
 
 /// Returns the brightness in [0, 1] of a texture at (x, y), m: a sum of lattice noises
-/// [Perlin1985]. Each has half the wavelength and 0.8 of the amplitude of the previous one. Noises
-/// that a sample of width `sample_m` cannot resolve are faded out, which avoids aliasing.
+/// [Perlin1985]. Each noise has half the wavelength and 0.8 times the amplitude of the previous
+/// noise. Noises that a sample of width `sample_m` cannot resolve are faded out, which avoids
+/// aliasing.
 double Brightness(const Rectangle& rectangle, double x, double y, double sample_m) {
   constexpr double kFalloff = 0.8, kContrast = 0.9;
   double sum = 0.0, amplitude = 1.0, squares = 0.0, wavelength = rectangle.grain_m;

@@ -15,7 +15,7 @@ namespace alidade {
 /// Rectangle that looks the same from both sides. The largest structures of its texture have the
 /// size `grain_m`.
 struct Rectangle {
-  Eigen::Vector3d corner, right, down;  ///< m, world; `right` and `down` are its edges
+  Eigen::Vector3d corner, right, down;  ///< m, world: a corner, and the two edges from it
   double grain_m;
   std::uint64_t texture;  ///< number of the texture; equal numbers give equal textures
 };

@@ -26,9 +26,9 @@ inline constexpr const char* kCsvKeys =
 /// A frame is one row. With `repeats` a frame is all consecutive rows with one time; it is complete
 /// when the next frame begins. The first line that is neither blank nor a comment (`#`) names the
 /// columns. The source ignores columns that the config does not name. If a cell marks a missing
-/// value, its stream or truth value is not in the frame, and nothing replaces it. Times without an
-/// exponent are read exactly, also in ns since 1970. Comments above the header can contain the
-/// calibration: see CsvCalibration.
+/// value, the frame omits the stream or true value of this cell, and nothing replaces it. Times
+/// without an exponent are read exactly, also in ns since 1970. Comments above the header can
+/// contain the calibration: see CsvCalibration.
 ///
 /// Keys         kCsvKeys.
 /// Errors       kBadData with file, line and column of the first invalid cell; kInputMissing; kIo

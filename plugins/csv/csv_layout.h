@@ -31,7 +31,7 @@ struct CsvField {
 /// Layout of a table according to the config: see kCsvKeys in csv.h.
 struct CsvLayout {
   std::optional<CsvColumn> time;  ///< empty if rate_hz determines the times
-  std::size_t time_digits = 9;    ///< decimal power from the unit of time to ns: s 9
+  std::size_t time_digits = 9;    ///< power of ten of the unit of time in ns: 9 for s
   bool time_repeats = false;      ///< true if consecutive rows with one time are one frame
   double rate_hz = 0.0;
   std::vector<CsvField> streams, truths;

@@ -119,8 +119,8 @@ class Canvas {
     Line({centre.x - reach, centre.y - reach}, {centre.x + reach, centre.y + reach}, colour, 2);
     Line({centre.x - reach, centre.y + reach}, {centre.x + reach, centre.y - reach}, colour, 2);
   }
-  /// Draws the ellipse r' P^-1 r = 9 about a mean, in units of `per_unit` px. y grows upwards if
-  /// per_unit.y is negative.
+  /// Draws the ellipse r' P^-1 r = 9 about a mean. `per_unit` is the length of a unit, px. If
+  /// per_unit.y is negative, y grows upwards.
   void ThreeSigma(cv::Point2d centre, const PlaneGaussian& gaussian, cv::Point2d per_unit,
                   const cv::Scalar& colour, int thickness = 1) {
     constexpr int kCorners = 40;

@@ -25,7 +25,7 @@ inline constexpr const char* kModelsKeys =
 ///   sensor     z = h(x_k) (+) s L n,   R = L L',   s = 1, or sigma_scale for an outlier
 ///   input      u_i(t) = mean_i + amplitude_i sin(2 pi frequency_hz t)
 ///
-/// with n ~ N(0, I). A filter with the same config is therefore consistent. Discrete noise w stays
+/// Here n ~ N(0, I). A filter with the same config is therefore consistent. Discrete noise w stays
 /// constant until the next measurement, as the filters assume (docs/noise_models.md).
 ///
 /// A sensor measures at each time step, or at its own rate_hz, provided that h is defined and the

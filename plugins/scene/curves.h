@@ -45,9 +45,9 @@ class CubicSpline {
 ///
 /// With this choice the angular velocity at q_i is omega_i. omega_i is a weighted mean of the rates
 /// of the rotations Log(q_i^-1 q_i+1) before and after q_i. The weight of each rate is the duration
-/// of the other rotation. At each end, omega_i is the rate of the only adjacent rotation. Between
-/// two key frames the curve is a slerp. This also holds for more key frames if all rotations have
-/// one axis and rate.
+/// of the other rotation. At each end, omega_i is the rate of the only adjacent rotation. If there
+/// are only two key frames, the curve is a slerp. With more key frames it is a slerp if all
+/// rotations have the same axis and rate.
 /// Source       [Kim1995] sec. 4.
 class RotationCurve {
  public:

@@ -16,9 +16,9 @@ namespace alidade::scene {
 /// keyframe. Keyframe k has the measurements
 ///
 ///   z = (R_k' (r_j - r_k) + n_r, (q_k^-1 q_j) (+) n_q)   for the previous keyframe, j = k - 1,
-///                                                        unless to_previous is false; and for a
-///                                                        closure: j is the nearest of the
-///                                                        keyframes old and near enough
+///                                                        unless to_previous is false; and, to
+///                                                        close a loop, for the nearest keyframe j
+///                                                        that is old and near enough
 ///   z = (0, 1), without noise                            for j = k, which defines the pose of k
 ///
 /// with n_r ~ N(0, sigma_r^2), n_q ~ N(0, sigma_q^2). The landmark of a measurement has the id

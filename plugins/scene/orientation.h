@@ -42,7 +42,7 @@ bool LookAt(const Eigen::Vector3d& position, const Eigen::Vector3d& target,
 ///   V(phi) = I + (1 - cos)/|phi|^2 [phi]x + (|phi| - sin)/|phi|^3 [phi]x^2
 ///
 /// y is the displacement of a body, in its initial axes, while the body rotates by phi, |phi| < 2
-/// pi. x is velocity times duration, with the velocity constant in the axes of the body.
+/// pi. If the velocity is constant in the axes of the body, x is velocity times duration.
 Eigen::Vector3d BodyFrameDisplacement(const Eigen::Vector3d& phi, const Eigen::Vector3d& y);
 
 }  // namespace alidade::scene

@@ -134,7 +134,7 @@ struct CostKind {
   int strides[Traits::kMaxRoles] = {};     ///< by role: row length of its Jacobian
   std::vector<int> sizes;                  ///< ambient sizes of the blocks
   std::vector<double> w;                   ///< W, row-major
-  std::vector<JacobianElement> unwritten;  ///< elements that the model does not write: 0
+  std::vector<JacobianElement> unwritten;  ///< elements that no model writes; set to 0
 
  private:
   /// True if the compiler knows the type of the sensor. role_count() and measured() are then

@@ -39,7 +39,7 @@ class SensorCost final : public ceres::CostFunction {
   ALIDADE_SCALAR_LOOPS bool Evaluate(const double* const* blocks, double* residuals,
                                      double** jacobians) const override {
     const double* const z = kind_.measured().ambient <= kInlineSize ? z_.inline_values : z_.pointer;
-    __builtin_prefetch(z);  // prefetched: z is read only after h has been computed
+    __builtin_prefetch(z);  // because z is read only after h has been computed
     const double* roles[Traits::kMaxRoles];
     double* j[Traits::kMaxRoles];
     Bind(blocks, jacobians, roles, j);

@@ -26,7 +26,7 @@ struct TargetMatch {
 /// Maximum of the correlations.
 struct Peak {
   double score = -1.0;
-  double lead = 0.0;  ///< over all positions half a template away or more
+  double lead = 0.0;  ///< over the best score half a template away or more
   cv::Point position;
 };
 

@@ -11,7 +11,8 @@
 
 #include "alidade/io/number_rows.h"
 
-/// Readers of the tables next to the images of a target. These are read together with the images.
+/// Readers of the tables next to the images of a target. The tables are read together with the
+/// images.
 namespace alidade {
 
 /// Reader of the boxes of the target: rows `frame,x,y,width,height` or `frame,x0,y0,...,x3,y3`,

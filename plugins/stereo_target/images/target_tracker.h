@@ -60,9 +60,9 @@ struct TargetOptions {
 ///
 /// If no template fits, the target is searched for nearby, see FindNearby(). It is then aligned
 /// with templates to which the blur of the motion was applied [Jin2005]. A blurred image determines
-/// the size less precisely, which its variance includes. It provides neither a template nor a size
-/// for the next image. If this search fails too, the target is only followed for some images. After
-/// that it is lost, and the whole image is searched.
+/// the size less precisely, which is included in the variance of the size. A blurred image provides
+/// neither a template nor a size for the next image. If this search fails too, the target is only
+/// followed for some images. After that it is lost, and the whole image is searched.
 class TargetTracker {
  public:
   using Corners = alidade::Corners;

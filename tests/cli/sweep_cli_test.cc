@@ -417,8 +417,8 @@ TEST_F(SweepCli, AVariedReferenceIsNamedForEachValue) {
   for (const std::string& text : {sweep.out, Read("out/table.md")}) {
     EXPECT_TRUE(Contains(text, "\ntruth: errors are differences from truth\n")) << text;
     EXPECT_TRUE(Contains(text,
-                         "\nekf: errors are differences from estimator 'ekf', an estimate "
-                         "itself: no coverage, no NEES\n"))
+                         "\nekf: errors are differences from estimator 'ekf', which is not "
+                         "the truth: no coverage, no NEES\n"))
         << text;
     EXPECT_TRUE(Contains(text, "; withheld in 1 of 1 runs")) << text;
   }

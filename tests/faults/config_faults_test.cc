@@ -180,8 +180,8 @@ const Fault kBlockFaults[] = {
               5, "depth"),
     MakeFault("25_truth_given_twice", "depth",
               {{kDepthSource, Rows("truth: {target.depth: d,\n  depth: d}")}}, 29,
-              "source.truth.depth: the truth does not match a block: target.depth has another "
-              "truth with its full name"),
+              "source.truth.depth: the truth does not match a block: target.depth already has "
+              "a truth with the full name"),
     MakeFault("25_truth_of_two_blocks", "depth",
               {{kTemplateBlocks, "{value: depth}"},
                {"{inverse_distance: {mean", "{depth: {mean"},

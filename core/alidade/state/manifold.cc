@@ -127,7 +127,8 @@ void Geometry::Normalise(double* x) const {
 
 void internal::WrapParts(const Geometry& geometry, double* x) {
   geometry.ForEachPart([&](const Geometry& part, int a, int) {
-    // Without a distance every x is a point, so that Normalise only wraps angles.
+    // If a geometry has no `distance` function, every x lies on the manifold, and Normalise() only
+    // wraps angles.
     if (!part.is_vector() && part.row().distance == nullptr) part.Normalise(x + a);
   });
 }

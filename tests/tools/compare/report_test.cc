@@ -72,7 +72,7 @@ TEST(CompareReport, ErrorsByTheirBoundAreNoRatiosToAReference) {
   comparison.estimators[0].ratios["mse_by_bound:p.x"] = {1.2, 1.0, 20, Interval{1.1, 1.3}};
   const std::string text = CompareReport(comparison, TableStyle::kText, ReportRows::kMain);
   EXPECT_TRUE(Contains(text, "\nMSE / Cramer-Rao bound, p.x  1.2000 [1.1000, 1.3000]\n")) << text;
-  EXPECT_TRUE(Contains(text, "MSE / Cramer-Rao bound: mean square error by")) << text;
+  EXPECT_TRUE(Contains(text, "MSE / Cramer-Rao bound: mean square error / smallest")) << text;
   EXPECT_FALSE(Contains(text, "  ratio: mean error")) << text;
 }
 

@@ -29,7 +29,7 @@
 
 namespace {
 
-constexpr int kAllFrames = 150;      // of the whole trajectory
+constexpr int kAllFrames = 150;      // frames of the whole trajectory
 constexpr double kAllRateHz = 30.0;  // frame rate with kAllFrames
 const std::vector<int> kFrames = {10, 19, 38, 75, kAllFrames};
 const std::vector<int> kPoints = {10, 20, 40, 80};

@@ -84,7 +84,7 @@ Vector3d Log(const Quaterniond& q) {
 struct Scene {
   std::vector<Pose> truth, start;
   std::vector<Vector3d> landmarks;
-  std::vector<Observed> observations;  ///< ordered by frame
+  std::vector<Observed> observations;  ///< observations, ordered by frame
 
   explicit Scene(int frames) {
     Random random(1);

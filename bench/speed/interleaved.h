@@ -15,7 +15,7 @@ namespace alidade::bench {
 struct Contender {
   std::string name;
   std::function<void()> chunk;  ///< work to time, about 0.4 ms
-  double steps = 1.0;           ///< steps in a chunk
+  double steps = 1.0;           ///< number of steps in a chunk
   std::vector<double> ns;       ///< CPU time per step of each chunk
 
   /// Returns the q-quantile of the time per step.

@@ -48,7 +48,7 @@ struct Pinhole : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>> {
     T h[3];
     UnitQuaternion::RotateBack(orientation, offset, h);
     if (!(h[2] > T(0.0))) return false;
-    const T inverse = 1.0 / h[2];  // the same expression is in the Jacobian: one division
+    const T inverse = 1.0 / h[2];  // as in the Jacobian, so one division serves both
     z[0] = kFocal * (h[0] * inverse);
     z[1] = kFocal * (h[1] * inverse);
     return true;
@@ -256,7 +256,7 @@ struct Contenders {
   SharedSensor abi_analytic = MakeSensor(analytic, "analytic");
   SharedSensor abi_automatic = MakeSensor(automatic, "automatic");
   std::vector<ceres_batch::RolePlace> places{{0, 0}, {0, 3}, {1, 0}};
-  std::vector<double> identity_weight{1.0, 0.0, 0.0, 1.0};  // W of 1 px
+  std::vector<double> identity_weight{1.0, 0.0, 0.0, 1.0};  // W for a noise of 1 px
   CostKind<PinholeAnalytic> analytic_kind{analytic, places, {kPose, 3}, identity_weight};
   CostKind<Pinhole> automatic_kind{automatic, places, {kPose, 3}, identity_weight};
   CostKind<SensorModel> abi_analytic_kind{*abi_analytic, places, {kPose, 3}, identity_weight};

@@ -88,7 +88,7 @@ class TumRows {
   bool has_next_ = false;
   Timestamp timestamp_ = 0;  ///< time of the last row that was read
   Pose pose_{};
-  Timestamp nearest_timestamp_ = 0;  ///< time of the row before
+  Timestamp nearest_timestamp_ = 0;  ///< time of the row before the last one
   std::optional<Pose> nearest_;
 };
 

@@ -152,7 +152,7 @@ class CsvSource : public Source {
     std::int64_t rows = 0;
     while (NextRow()) ++rows;
     reader_.Rewind();
-    NextRow();  // the header
+    NextRow();  // skips the header
     if (!layout_.time_repeats) size_ = rows;
     const double share = layout_.blind_after * static_cast<double>(rows);
     first_blind_row_ = static_cast<std::int64_t>(std::ceil(share * (1.0 - 1e-12)));

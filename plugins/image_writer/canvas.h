@@ -86,7 +86,7 @@ class Canvas {
             double size = 0.45, Align align = Align::kLeft, int thickness = 1) {
     std::string ascii;
     for (const char c : text) {
-      if ((static_cast<unsigned char>(c) & 0xC0U) == 0x80U) continue;  // UTF-8 continuation
+      if ((static_cast<unsigned char>(c) & 0xC0U) == 0x80U) continue;  // continuation byte of UTF-8
       ascii += c >= ' ' && c <= '~' ? c : '?';
     }
     int baseline = 0;
@@ -143,7 +143,7 @@ class Canvas {
  private:
   static constexpr int kShift = 4, kFont = cv::FONT_HERSHEY_SIMPLEX;
   static constexpr double kFixedPointScale = 1 << kShift;
-  static constexpr double kDrawableLimit = 1e5;  ///< px: OpenCV is limited to 2^31 / 2^kShift
+  static constexpr double kDrawableLimit = 1e5;  ///< px; the limit of OpenCV is 2^31 / 2^kShift
 
   static bool IsDrawable(cv::Point2d point) {
     return std::abs(point.x) < kDrawableLimit && std::abs(point.y) < kDrawableLimit;

@@ -75,7 +75,7 @@ class Models : public Source {
     const MotionBinding* binding;
     Random noise;
     int stream = -1;                       ///< stream of its control input
-    const Motion* input_source = nullptr;  ///< motion that draws the input, if not this one
+    const Motion* input_source = nullptr;  ///< motion that draws the input; null: this motion
     std::vector<double> input, mean, amplitude;
     double frequency_hz = 0.0;
     std::vector<double> w;       ///< current noise

@@ -84,9 +84,9 @@ class Scene : public Source {
   /// Observation of a visible point.
   struct Observation {
     std::size_t point;
-    double pixel[2];              ///< exact
-    double depth;                 ///< hz, m
-    std::array<double, 4> noise;  ///< of unit variance
+    double pixel[2];              ///< exact pixel
+    double depth;                 ///< exact depth hz, m
+    std::array<double, 4> noise;  ///< noise of unit variance
   };
 
   void ReadNumbers(Params& p) {

@@ -184,7 +184,7 @@ class Tracks : public Source {
   std::vector<StreamInfo> streams_, truths_;
   TracksOptions options_;
   std::int64_t frames_ = 0, frame_ = -1;
-  std::set<std::int64_t> excluded_ids_;  ///< features of frames before features_from
+  std::set<std::int64_t> excluded_ids_;  ///< ids that occur in frames before features_from
   Pose first_pose_{};
   std::optional<std::filesystem::path> calibration_;
   std::optional<FeatureRows> tracks_, known_;

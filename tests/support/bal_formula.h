@@ -17,7 +17,7 @@
 namespace alidade::testing {
 
 struct FormulaCost {
-  double squares = 0.0;  ///< sum of |p' - z|^2, px^2
+  double squares = 0.0;  ///< sum of |p' - z|^2 over all observations z, px^2
   int observations = 0;
   int behind = 0;  ///< number of observations with P_z > 0
   double Rms() const { return std::sqrt(squares / observations); }

@@ -162,7 +162,7 @@ class Bundle {
   std::vector<bool> fixed_;            ///< by element of the intrinsics: true if it is constant
   bool lens_in_camera_block_ = false;  ///< true if the block of a camera contains its intrinsics
   std::vector<double> cameras_, lenses_, points_;
-  std::map<std::vector<double>, std::unique_ptr<CostKind<SensorModel>>> kinds_;  ///< keys: W
+  std::map<std::vector<double>, std::unique_ptr<CostKind<SensorModel>>> kinds_;  ///< by W
   ceres::Problem ceres_problem_;
 };
 
@@ -188,7 +188,7 @@ void Bundle::Eliminate(ceres::Solver::Options& options) {
     add(camera(i), points_first ? 1 : 0);
   for (int i = 0; i < static_cast<int>(problem_data_.intrinsics.size()); ++i) add(lens(i), 1);
   options.linear_solver_ordering = ordering;
-  constexpr int kDense = 1000;  // unknowns after elimination, up to which the solver is dense
+  constexpr int kDense = 1000;  // most unknowns after elimination for a dense solver
   options.linear_solver_type =
       std::min(cameras, points) <= kDense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
 }

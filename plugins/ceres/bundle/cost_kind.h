@@ -60,7 +60,7 @@ struct SensorTraits {
 /// Properties of a sensor behind the plugin ABI.
 template <>
 struct SensorTraits<SensorModel> {
-  static constexpr int kMaxRoles = 64;  // the maximum number of roles of a model
+  static constexpr int kMaxRoles = 64;  // maximum number of roles of a model
   static detail::Measured Measured(const SensorModel& sensor) {
     const Geometry& z = sensor.measurement().geometry;
     return {z.row().number, z.ambient, z.tangent};
@@ -93,7 +93,7 @@ struct CostKind {
     const std::vector<Geometry> geometries = Traits::Geometries(model);
     const auto m = static_cast<std::size_t>(measured().tangent);
     ALIDADE_EXPECTS(roles.size() == geometries.size() && w.size() == m * m);
-    std::vector<std::vector<bool>> bound, written;  // by block and element
+    std::vector<std::vector<bool>> bound, written;  // elements of each block
     for (const int size : blocks) bound.emplace_back(static_cast<std::size_t>(size), false);
     written = bound;
     role_count_ = static_cast<int>(roles.size());
@@ -130,8 +130,8 @@ struct CostKind {
   const Sensor& sensor;
   double scale = 1.0;
   bool isotropic = true;                   ///< true if W = scale I
-  RolePlace places[Traits::kMaxRoles];     ///< by role; an array, because each evaluation reads it
-  int strides[Traits::kMaxRoles] = {};     ///< by role: row length of its Jacobian
+  RolePlace places[Traits::kMaxRoles];     ///< of the roles; each evaluation reads this array
+  int strides[Traits::kMaxRoles] = {};     ///< row lengths of the Jacobians of the roles
   std::vector<int> sizes;                  ///< ambient sizes of the blocks
   std::vector<double> w;                   ///< W, row-major
   std::vector<JacobianElement> unwritten;  ///< elements that no model writes; set to 0

@@ -28,9 +28,8 @@ ImageReader::ImageReader(std::filesystem::path path, const std::string& names, c
   }
   is_live_ = std::filesystem::is_character_file(path_, error);
   if (!is_live_ && !std::filesystem::is_regular_file(path_, error)) {
-    throw Error(ExitCode::kBadData,
-                ErrorLine({path_.string()}, {}, "not a file",  // for example a pipe
-                          "a video, a folder of images, or a camera"));
+    throw Error(ExitCode::kBadData, ErrorLine({path_.string()}, {}, "not a file",  // such as a pipe
+                                              "a video, a folder of images, or a camera"));
   }
   if (is_live_ ? video_.open(path_.string(), cv::CAP_V4L2) : video_.open(path_.string())) return;
   throw Error(

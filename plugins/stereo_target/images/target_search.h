@@ -153,7 +153,7 @@ inline std::optional<Corners> FindAnywhere(const std::vector<TargetTemplate>& te
                                            const cv::Mat& grey, const Corners& last,
                                            double min_score) {
   constexpr double kSide = 40.0, kGrowth = 2.0;         // px of the shrunk template
-  constexpr double kMinSide = 6.0, kMinVisible = 12.0;  // px: shrunk; in the image
+  constexpr double kMinSide = 6.0, kMinVisible = 12.0;  // minimum sides, px
   std::optional<Corners> best;
   double best_score = min_score;
   for (const TargetTemplate& target_template : templates) {

@@ -21,7 +21,7 @@ namespace alidade {
 /// Position at which a filter expects a feature in an image: a Gaussian with the covariance s.
 struct ExpectedPoint {
   cv::Point2f position;
-  cv::Matx22d s;  ///< px^2
+  cv::Matx22d s;  ///< covariance of the position, px^2
 
   /// Returns the standard deviation along the longer axis of the ellipse.
   double LargestSigma() const {
@@ -239,7 +239,7 @@ class FeatureTracker {
   PyramidFlow flow_;
   CornerFinder finder_;
   std::vector<Feature> features_;
-  std::vector<cv::Point2f> added_points_;  ///< tracked from the next image on
+  std::vector<cv::Point2f> added_points_;  ///< points to track from the next image on
   std::int64_t next_id_ = 0;
 
   // Buffers.

@@ -191,7 +191,7 @@ class FoundPatch {
   float length_ = 0.0F;    ///< length of patch_
   Eigen::Matrix<float, Eigen::Dynamic, 6> jacobian_;
   Matrix6 inverse_ = Matrix6::Zero();                  ///< inverse of J' J
-  Eigen::Matrix<float, Eigen::Dynamic, 2> influence_;  ///< k
+  Eigen::Matrix<float, Eigen::Dynamic, 2> influence_;  ///< k, see Covariance()
   Eigen::Matrix2f shape_ = Eigen::Matrix2f::Zero();    ///< A: from units of half the side to px
   Eigen::VectorXf sampled_;  ///< image values at the patch, from the last alignment
   float gain_ = 0.0F;        ///< a

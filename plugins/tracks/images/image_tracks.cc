@@ -70,7 +70,7 @@ class ImageTracks : public Source {
   Place place() const override { return images_->place(); }
   std::int64_t size() const override {
     if (images_->size() <= 0)
-      return max_frames_ > 0 ? max_frames_ : -1;  // number unknown: a camera, or a video without it
+      return max_frames_ > 0 ? max_frames_ : -1;  // unknown for a camera and for some videos
     const std::int64_t remaining = start_.Remaining(images_->size());
     return max_frames_ > 0 ? std::min(max_frames_, remaining) : remaining;
   }

@@ -307,7 +307,7 @@ TEST(CeresBatchEnds, ALossTakesNoStepUphill) {
   };
   const auto [expected, none] = last_of({});
   const auto [found, said] = last_of({LossKind::kHuber, 1e9});
-  EXPECT_NEAR(found / expected, 1.0, 1e-4) << said;  // 1e8, with relative rounding errors of 1e-4
+  EXPECT_NEAR(found / expected, 1.0, 1e-4) << said;  // both 1e8, rounded to 1e-4
   EXPECT_EQ(said.find("not_converged: the weights of the losses did not settle in 0 steps: "), 0u)
       << said;
   EXPECT_NE(said.find("it does not lower the cost\n"), std::string::npos) << said;

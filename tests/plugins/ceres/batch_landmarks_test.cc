@@ -128,7 +128,7 @@ TEST(CeresBatchLandmarks, WithoutAnyTheSolutionIsThatOfTheProblemWithoutThem) {
   }
   expect_equal(testing::LinearSystem(), point, 1e-9);
   Problem robust = testing::DepthFilter();
-  expect_equal(robust, depth, 1e-6);  // the state-dependent noise settles to 1e-9
+  expect_equal(robust, depth, 1e-6);  // the noise, which depends on the state, settles to 1e-9
   robust.sensors[0].loss = {LossKind::kHuber, 1.0};
   expect_equal(robust, depth, 1e-5);  // steps end below 1e-6 sigma
 }

@@ -119,7 +119,7 @@ TEST(CeresBatchLoss, EqualsIterativelyReweightedLeastSquares) {
       EXPECT_LT((found.x[k] - expected.x[k]).cwiseAbs().maxCoeff(), 1e-9) << k;
       EXPECT_LT((found.p[k] - expected.p[k]).cwiseAbs().maxCoeff(), 1e-9) << k;
     }
-    EXPECT_NEAR(found.cost, expected.cost, 1e-8 * expected.cost);  // printed with nine digits
+    EXPECT_NEAR(found.cost, expected.cost, 1e-8 * expected.cost);  // nine digits are printed
     EXPECT_GT(std::abs(found.x[5](0) - plain), 0.05);              // the loss has an effect
   }
 }

@@ -45,7 +45,8 @@ void ExpectSame(const Found& found, const Found& expected, double states = kStat
   ASSERT_FALSE(expected.failed) << expected.events.back().text;
   EXPECT_NE(found.events.back().text.find("sparse"), std::string::npos);
   EXPECT_EQ(expected.events.back().text.find("sparse"), std::string::npos);
-  EXPECT_NEAR(CostOf(found), CostOf(expected), 2e-8 * (1.0 + CostOf(expected)));  // 9 digits
+  EXPECT_NEAR(CostOf(found), CostOf(expected),
+              2e-8 * (1.0 + CostOf(expected)));  // nine digits
   ASSERT_EQ(found.states.size(), expected.states.size());
   double worst_x = 0.0, worst_p = 0.0;
   for (std::size_t k = 0; k < found.states.size(); ++k) {

@@ -45,7 +45,7 @@ std::vector<Frame> LinearFrames(int count) {
   std::vector<Frame> frames;
   for (int k = 0; k < count; ++k) {
     const double t_s = 0.05 * k, wobble = 0.3 * std::sin(37.0 * k);
-    frames.push_back(k % 4 == 3 ? FrameAt(t_s, {})  // without a measurement
+    frames.push_back(k % 4 == 3 ? FrameAt(t_s, {})  // no measurement
                                 : FrameAt(t_s, {{0, 2.0 * std::cos(t_s) + wobble}}));
   }
   return frames;
@@ -322,7 +322,7 @@ void ExpectStationary(const Geometry& geometry) {
   problem.priors.push_back({id, mean, 0.25 * Eigen::MatrixXd::Identity(t, t), ""});
   AddSensor(problem, "z", MakeSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
   std::vector<Frame> frames;
-  for (int k = 0; k < 3; ++k) {  // far from the mean and from each other
+  for (int k = 0; k < 3; ++k) {  // values far from the mean and from each other
     const double d[3] = {0.9 + 0.4 * k, -0.5 * k, 0.3};
     Measurement m{TimestampFromSeconds(k), 0, -1, std::vector<double>(G::kAmbient), {}};
     geometry.Plus(mean.data(), d, m.values.data());

@@ -114,7 +114,8 @@ void ExpectTheKalmanFilter(const Problem& problem, const std::vector<Frame>& fra
 TEST(FixedLag, OfALinearProblemIsTheKalmanFilterWhateverTheWindow) {
   const std::vector<Frame> frames = LinearFrames(60);
   ExpectTheKalmanFilter(LinearSystem(), frames);
-  ExpectTheKalmanFilter(LinearSystem(), frames, "lag_s: 0.04\n");  // shorter than a frame
+  ExpectTheKalmanFilter(LinearSystem(), frames,
+                        "lag_s: 0.04\n");  // less than a period
   ExpectTheKalmanFilter(LinearSystem(), frames, "lag_s: 0.7\n");
   std::vector<Frame> gap = LinearFrames(10);  // the whole window leaves at once
   gap.push_back(FrameAt(4.0, {{0, 1.2}}));

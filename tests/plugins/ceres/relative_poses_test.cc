@@ -56,7 +56,7 @@ struct Walked {
       if (k > 0) see(k - 1);
       if (k >= loop && k % 4 == 0) see(k - loop);
       frame.measurements.push_back(
-          {frame.timestamp, 0, k, {0, 0, 0}, std::vector<double>(9, 0.0)});  // keyframe k itself
+          {frame.timestamp, 0, k, {0, 0, 0}, std::vector<double>(9, 0.0)});  // defines keyframe k
       frames.push_back(std::move(frame));
     }
     covariance = information.inverse();

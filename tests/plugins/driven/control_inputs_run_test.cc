@@ -29,7 +29,7 @@ struct Gaussian {
 /// earlier, at 4 s, because its timeout is 1.5 s.
 std::vector<Gaussian> WrittenOut(bool smoothed) {
   struct Row {
-    double t_s, distance, fix;  // m: distance since the previous row; fix, 0: none
+    double t_s, distance, fix;  // distance since the previous row, m; fix, m, or 0
   };
   const std::vector<Row> rows = {
       {0.0, 0.0, 1.2},       {0.5, 0.0, 0.0},        {1.0, 2.0 * 0.5, 2.3}, {1.7, 1.5 * 0.7, 0.0},

@@ -52,7 +52,7 @@ TEST_F(HostTest, RunsASensorOfOneFileBuiltByABareCommandLine) {
   const int strides[] = {2, 2};
   ASSERT_EQ(radar->Linearise(roles, &z, jacobians, strides), Status::kOk);
   ASSERT_EQ(radar->SqrtNoise(roles, &z, &l), Status::kOk);
-  EXPECT_DOUBLE_EQ(z, 6.0);  // 3 10 / 5
+  EXPECT_DOUBLE_EQ(z, 6.0);  // 3 * 10 / 5
   EXPECT_DOUBLE_EQ(by_v[0], 0.6);
   EXPECT_DOUBLE_EQ(by_v[1], 0.8);
   EXPECT_DOUBLE_EQ(by_p[0], 10.0 / 5.0 - 6.0 * 3.0 / 25.0);

@@ -130,7 +130,7 @@ class Tally : public RunObserver {
   }
   static void Add(const Eigen::MatrixXd& p, const Eigen::VectorXd& error, ChiSquare& nees) {
     const double square = internal::SquaredMahalanobis(p, error);
-    ASSERT_GE(square, 0.0);  // P must be regular
+    ASSERT_GE(square, 0.0);  // P is positive definite
     nees.Add(square, static_cast<int>(error.size()));
   }
 

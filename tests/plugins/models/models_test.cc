@@ -174,10 +174,10 @@ TEST(Models, TheStartIsDrawnFromThePrior) {
     mean += d / kDraws;
     moment += d * d.transpose() / kDraws;
   }
-  EXPECT_LT(mean.norm(), 0.15);  // sd 0.035
+  EXPECT_LT(mean.norm(), 0.15);  // standard deviation 0.035
   Eigen::Matrix3d expected;
   expected << 4, 1.2, 0, 1.2, 1, 0, 0, 0, 0;
-  EXPECT_LT((moment - expected).cwiseAbs().maxCoeff(), 0.4);  // sd of the largest 0.09
+  EXPECT_LT((moment - expected).cwiseAbs().maxCoeff(), 0.4);  // largest sd 0.09
   EXPECT_EQ(moment(2, 2), 0.0);
 }
 
@@ -224,7 +224,7 @@ TEST(Models, SensorsHaveRatesGapsAndOutliers) {
   for (const SourceFrame& frame : FramesOf(Parse(text + "sensors: {stereo: {missing: 0.25}}}"))) {
     count += frame.measurements.size();
   }
-  EXPECT_NEAR(static_cast<double>(count), 7500, 200);  // sd 43
+  EXPECT_NEAR(static_cast<double>(count), 7500, 200);  // standard deviation 43
   int far = 0, farther = 0;
   for (const SourceFrame& frame :
        FramesOf(Parse(text + "sensors: {stereo: {outliers: {share: 0.1, sigma_scale: 100}}}}"))) {
@@ -232,8 +232,8 @@ TEST(Models, SensorsHaveRatesGapsAndOutliers) {
     far += std::abs(error) > 4 * 0.02 ? 1 : 0;
     farther += std::abs(error) > 100 * 0.02 ? 1 : 0;
   }
-  EXPECT_NEAR(far, 969, 120);     // 0.1 P(|n| > 0.04) of 10 001
-  EXPECT_NEAR(farther, 317, 70);  // 0.1 P(|n| > 1)
+  EXPECT_NEAR(far, 969, 120);     // 10 001 times 0.1 P(|n| > 0.04)
+  EXPECT_NEAR(farther, 317, 70);  // 10 001 times 0.1 P(|n| > 1)
 }
 
 // A control input acts on the true state until the next frame, as it does in the filter.

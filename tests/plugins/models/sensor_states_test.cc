@@ -186,9 +186,9 @@ TEST(SensorStates, AGaussMarkovStateKeepsItsVariance) {
     lagged += last * before / kDraws;
   }
   if (testing::kSanitized) return;
-  EXPECT_NEAR(sum, 0.0, 0.35);                               // sd 0.08
-  EXPECT_NEAR(squares, 4.0, 0.9);                            // sd 0.23
-  EXPECT_NEAR(lagged / squares, std::exp(-0.5 / 1.5), 0.1);  // at 2 Hz
+  EXPECT_NEAR(sum, 0.0, 0.35);                               // standard deviation 0.08
+  EXPECT_NEAR(squares, 4.0, 0.9);                            // standard deviation 0.23
+  EXPECT_NEAR(lagged / squares, std::exp(-0.5 / 1.5), 0.1);  // frames are 0.5 s apart
 }
 
 const std::string kPose =

@@ -71,7 +71,7 @@ TEST(CubicSpline, IsTheNaturalSplineOfTheTextbook) {
 TEST(CubicSpline, OfTwoPointsIsALineAndOfOneStandsStill) {
   const CubicSpline line({0, 2}, {{0, 0, 0}, {2, 4, 6}});
   EXPECT_LT((line.At(0.5) - Vector3d(0.5, 1, 1.5)).norm(), 1e-15);
-  EXPECT_LT((line.At(-1.0) - Vector3d(-1, -2, -3)).norm(), 1e-14);  // linear
+  EXPECT_LT((line.At(-1.0) - Vector3d(-1, -2, -3)).norm(), 1e-14);  // linear extrapolation
   EXPECT_EQ(CubicSpline({0}, {{1, 2, 3}}).At(7.0), Vector3d(1, 2, 3));
 }
 

@@ -29,7 +29,7 @@ struct Walk : Motion<3, Vec<3>> {
   }
 };
 
-/// z = p - r + b
+/// Sensor z = p - r + b, with the bias b.
 struct Offset : Sensor<Vec<3>, Vec<3>, Vec<3>, Vec<3>> {
   static constexpr std::array kRoles{Quantity{"position", "m", "", "x,y,z"},
                                      Quantity{"bias", "m", "", "x,y,z"},

@@ -95,8 +95,8 @@ class CsvSource : public Source {
   }
 
   /// Reads the next line that is neither a comment nor blank. A blank line is also a row in two
-  /// cases: if the table has a single column, whose cell may be missing, and if the number of the
-  /// row determines the time.
+  /// cases: the cell of a single column may be missing, or the number of the row determines the
+  /// time.
   bool NextRow() {
     while (reader_.Next(line_)) {
       if (line_.starts_with('#')) {

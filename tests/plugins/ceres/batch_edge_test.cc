@@ -80,7 +80,8 @@ Found SolveSparse(const std::vector<std::array<Vector3d, 2>>& seen) {
 
 void ExpectSolution(const Found& found, const VectorXd& x, const MatrixXd& p) {
   ASSERT_FALSE(found.failed);
-  // The positions are of about 0.1 m. Landmark 7 stays 1e-9 sigma from the boundary.
+  // The tolerance is relative to positions of about 0.1 m. Landmark 7 stays 1e-9 sigma from the
+  // boundary.
   constexpr double kNear = 1e-8;
   for (int k = 0; k < kViews; ++k) {
     const auto at = static_cast<std::size_t>(k);

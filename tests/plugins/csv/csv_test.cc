@@ -260,7 +260,7 @@ TEST_F(Csv, BlindAfterDropsTheFirstStreamInTheRestOfTheSeries) {
 }
 
 TEST_F(Csv, BlindAfterIsExactWhereTheShareIs) {
-  // The test is of rounding: in double precision 0.07 * 100 is 7.000000000000001.
+  // Tests the rounding: in double precision 0.07 * 100 is 7.000000000000001.
   std::string text = "t_s,z\n";
   for (int i = 0; i < 100; ++i) text += std::to_string(i) + ",1\n";
   Write(text);

@@ -55,7 +55,7 @@ std::string Name(const ::testing::TestParamInfo<Fault>& info) {
 class OneFault : public CheckTest, public ::testing::WithParamInterface<Fault> {};
 
 TEST_P(OneFault, IsFoundByItsCheckAlone) {
-  // A sanitizer itself ends such a process, and has a different stack.
+  // In a sanitizer build the sanitizer ends such a process, and the stack is different.
   const std::string model = GetParam().model;
   const bool differs = model == "exits" || model == "eats_memory" || model == "unwritten";
   if (testing::kSanitized && differs) GTEST_SKIP() << "a sanitizer ends the process differently";

@@ -171,7 +171,7 @@ TEST_P(ModelsProblem, OnlyTheFilterOfTheModelsIsConsistent) {
         EXPECT_TRUE(sum.IsWithin(0.99)) << what << ": " << ::testing::PrintToString(sum);
       }
     } else if (!testing::kSanitized) {  // a sanitizer build has too few runs
-      // A correct estimator is outside by chance once in 1e9 runs of this test.
+      // A correct estimator is outside this interval once in 1e9 runs of the test, by chance.
       const auto far = [](const auto& one) { return !one.second.IsWithin(1.0 - 1e-9); };
       EXPECT_TRUE(std::ranges::any_of(sums, far)) << name << " is not seen";
     }

@@ -289,7 +289,7 @@ class CondensedRun {
   static State Filled(State state);
   std::vector<double> ValuesOf(const State& state) const;
   std::vector<double> ValuesOf(const MapLandmark& landmark, const std::vector<double>& x) const;
-  bool AddSteps(Timestamp from, Timestamp to, Epoch& epoch);
+  bool AddSteps(Timestamp begin, Timestamp end, Epoch& epoch);
   void AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch);
   void AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch);
   void AddKnown();

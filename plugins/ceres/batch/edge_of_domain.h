@@ -53,7 +53,7 @@ class EdgeOfDomain {
   bool IsDefined(const MapLandmark& landmark, const Eigen::VectorXd& l,
                  const std::vector<Point>& points) const;
   std::optional<double> EdgeAlong(const MapLandmark& landmark, const Eigen::VectorXd& l,
-                                  const Eigen::VectorXd& s, double from, double to,
+                                  const Eigen::VectorXd& s, double begin, double end,
                                   const std::vector<Point>& points) const;
   std::optional<Eigen::VectorXd> NormalOfEdge(const MapLandmark& landmark, const Eigen::VectorXd& l,
                                               const Eigen::VectorXd& s, double t,

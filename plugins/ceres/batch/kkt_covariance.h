@@ -14,7 +14,7 @@ namespace alidade::ceres_batch {
 /// of its inverse, which are made once. It has to stay as it is while they are asked for.
 class KktSystem::Covariances {
  public:
-  explicit Covariances(KktSystem& of);
+  explicit Covariances(KktSystem& system);
 
   /// By what share, about, rounding may change the variances of what sensors read: they lose what a
   /// variance has more than the information of all frames, which it cancels in, eps P_ii |H_ii|.

@@ -77,11 +77,11 @@ std::vector<int> KktSystem::ConstantsOf(const std::vector<JacobianPart>& parts) 
   std::vector<int> found;
   for (const JacobianPart& part : parts) {
     for (std::size_t i = 0; i < constants_.size(); ++i) {
-      const int at = static_cast<int>(i);
+      const int index = static_cast<int>(i);
       const int row = constants_[i].rows.front();
       if (constants_[i].born && part.offset <= row && row < part.offset + part.size &&
-          std::ranges::find(found, at) == found.end()) {
-        found.push_back(at);
+          std::ranges::find(found, index) == found.end()) {
+        found.push_back(index);
       }
     }
   }

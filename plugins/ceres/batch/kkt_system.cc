@@ -429,12 +429,12 @@ void KktSystem::ChooseScale() {
 /// Of the rows of B.
 Eigen::VectorXd KktSystem::Multipliers(const Node& node) const {
   Eigen::VectorXd lambda(node.b.rows());
-  Eigen::Index at = 0;
+  Eigen::Index offset = 0;
   const auto put = [&](int variable) {
     if (variable < 0) return;
     const int size = ldl_.SizeOf(variable);
-    lambda.segment(at, size) = solution_.segment(ldl_.RowOf(variable), size);
-    at += size;
+    lambda.segment(offset, size) = solution_.segment(ldl_.RowOf(variable), size);
+    offset += size;
   };
   put(node.multiplier);
   for (const std::size_t i : node.born) put(constants_[i].multiplier);

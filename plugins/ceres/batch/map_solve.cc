@@ -171,22 +171,22 @@ ceres::Solver::Summary SolveFrozen(CondensedRun& run, Eigen::VectorXd& e, int ma
   return summary;
 }
 
-/// False, with `at` as it was, where a model is not defined or U'U is singular.
-bool GaussNewtonAt(CondensedRun& run, const Eigen::VectorXd& e, GaussNewton& at) {
+/// False, with `result` as it was, where a model is not defined or U'U is singular.
+bool GaussNewtonAt(CondensedRun& run, const Eigen::VectorXd& e, GaussNewton& result) {
   const RunShape shape = run.shape();
   const Eigen::Index n = e.size(), m = shape.residuals;
   if (shape.has_landmarks) {
     Reduced reduced;
     if (!run.Reduce(e, true, reduced)) return false;
-    at.cost = reduced.cost;
-    at.u = reduced.llt.matrixU();
-    at.step = -reduced.llt.solve(reduced.g);
+    result.cost = reduced.cost;
+    result.u = reduced.llt.matrixU();
+    result.step = -reduced.llt.solve(reduced.g);
     return true;
   }
   RowMajor j = RowMajor::Identity(n + m, n);
   Eigen::VectorXd r(m), weighted(n + m);
   if (!run.Evaluate(e, r.data(), j.data() + n * n)) return false;
-  at.cost = CostOf(run, e, r);
+  result.cost = CostOf(run, e, r);
   weighted << e, r;
   for (const Part& part : shape.parts) {
     if (part.loss.kind == LossKind::kNone) continue;
@@ -195,8 +195,8 @@ bool GaussNewtonAt(CondensedRun& run, const Eigen::VectorXd& e, GaussNewton& at)
     j.middleRows(n + part.row, part.size) *= root;
   }
   internal::LeastSquares found = internal::SolveLeastSquares(j, weighted);
-  at.u = std::move(found.r);
-  at.step = -found.x;
+  result.u = std::move(found.r);
+  result.step = -found.x;
   return true;
 }
 

@@ -102,15 +102,17 @@ bool CondensedRun::LineariseFirst(const Point& point, const std::vector<Leaving>
   Eigen::Index row = prior;
   Eigen::VectorXd residual;
   Eigen::MatrixXd a;
-  const auto add = [&](const Factor& factor, const std::vector<double>& x, const Leaving* of) {
+  const auto add = [&](const Factor& factor, const std::vector<double>& x,
+                       const Leaving* leaving_landmark) {
     if (factor.left_out) return true;
     if (!Residual(factor, x, residual, &a)) return false;
     const double root = std::sqrt(Weight(SensorOf(factor).loss, residual.norm()));
     Eigen::MatrixXd a_x = a.leftCols(n);
-    if (of != nullptr) {
+    if (leaving_landmark != nullptr) {
       const auto a_y = a.rightCols(a.cols() - n);
-      a_x += a_y * of->place.by_x;
-      j.block(row, of->column, a.rows(), of->place.by_d.cols()) = root * a_y * of->place.by_d;
+      a_x += a_y * leaving_landmark->place.by_x;
+      j.block(row, leaving_landmark->column, a.rows(), leaving_landmark->place.by_d.cols()) =
+          root * a_y * leaving_landmark->place.by_d;
     }
     j.block(row, 0, a.rows(), c) = root * a_x * point.s;
     r.segment(row, a.rows()) = root * residual;
@@ -177,10 +179,10 @@ Eigen::MatrixXd CondensedRun::PutInState(const Point& point, std::vector<Leaving
   for (Leaving& one : leaving) {
     MapLandmark& landmark = landmarks_[one.landmark];
     if (landmark.l.size() == 0 || !goes_on[one.landmark]) continue;
-    const Eigen::Index at = s.rows(), t = one.place.by_d.rows();
-    s.conservativeResizeLike(Eigen::MatrixXd::Zero(at + t, columns));
-    s.block(at, 0, t, c) = one.place.by_x * point.s;
-    s.block(at, one.column, t, one.place.by_d.cols()) = one.place.by_d;
+    const Eigen::Index row = s.rows(), t = one.place.by_d.rows();
+    s.conservativeResizeLike(Eigen::MatrixXd::Zero(row + t, columns));
+    s.block(row, 0, t, c) = one.place.by_x * point.s;
+    s.block(row, one.column, t, one.place.by_d.cols()) = one.place.by_d;
     landmark.mean = std::move(one.place.y);
     AddBlocks(landmark, state);
   }

@@ -110,7 +110,7 @@ Eigen::MatrixXd CondensedRun::Assemble(const Eigen::VectorXd& e, const std::vect
   g = e;
   if (size == 0) return a;
   const Eigen::MatrixXd& h = information.h;
-  Eigen::MatrixXd s(size, inputs_), hs = Eigen::MatrixXd::Zero(size, inputs_);
+  Eigen::MatrixXd s(size, inputs_), h_s = Eigen::MatrixXd::Zero(size, inputs_);
   Eigen::VectorXd offset(size);
   const auto begin = [&](std::size_t k) {
     return k < points.size() ? Eigen::Index{epochs_[k].column} : Eigen::Index{inputs_};
@@ -126,15 +126,15 @@ Eigen::MatrixXd CondensedRun::Assemble(const Eigen::VectorXd& e, const std::vect
     const Eigen::MatrixXd own = h.block(row, row, d, d).selfadjointView<Eigen::Lower>();
     const auto before = h.block(row, first, d, row - first);
     const auto here = s.block(row, 0, d, begin(k + 1));
-    hs.block(row, 0, d, here.cols()) += internal::Product(own, here);
-    hs.block(row, 0, d, begin(k)) +=
+    h_s.block(row, 0, d, here.cols()) += internal::Product(own, here);
+    h_s.block(row, 0, d, begin(k)) +=
         internal::Product(before, s.block(first, 0, row - first, begin(k)));
-    hs.block(first, 0, row - first, here.cols()) += internal::TransposedProduct(before, here);
+    h_s.block(first, 0, row - first, here.cols()) += internal::TransposedProduct(before, here);
   }
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const auto row = d * static_cast<Eigen::Index>(k), from = begin(k), to = begin(k + 1);
-    a.block(from, 0, to - from, to) += internal::TransposedProduct(
-        s.block(row, from, size - row, to - from), hs.block(row, 0, size - row, to));
+    const auto row = d * static_cast<Eigen::Index>(k), first = begin(k), end = begin(k + 1);
+    a.block(first, 0, end - first, end) += internal::TransposedProduct(
+        s.block(row, first, size - row, end - first), h_s.block(row, 0, size - row, end));
   }
   const Eigen::VectorXd g_x = information.g + h.selfadjointView<Eigen::Lower>() * offset;
   g += s.transpose() * g_x;

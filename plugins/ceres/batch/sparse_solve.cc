@@ -192,9 +192,9 @@ std::optional<SparseSolve::Trial> SparseSolve::Extrapolated(double predicted) {
   for (Eigen::Index i = 0; i < count; ++i) {
     const Stepped& from = last_[static_cast<std::size_t>(i)];
     const bool newest = i + 1 == count;
-    const Stepped* const to = newest ? nullptr : &last_[static_cast<std::size_t>(i) + 1];
-    dz.col(i) = (newest ? z_ : to->z) - from.z;
-    ds.col(i) = (newest ? kkt_.step().dz : to->step) - from.step;
+    const Stepped* const next = newest ? nullptr : &last_[static_cast<std::size_t>(i) + 1];
+    dz.col(i) = (newest ? z_ : next->z) - from.z;
+    ds.col(i) = (newest ? kkt_.step().dz : next->step) - from.step;
   }
   const Eigen::VectorXd t = internal::SolveByPivoting(ds, kkt_.step().dz);
   Trial trial;

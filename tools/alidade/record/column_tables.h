@@ -256,8 +256,8 @@ inline constexpr std::array kErrorColumns{
     kSigmaColumns};
 
 /// Appends the columns of one block.
-template <std::size_t n>
-void AppendColumns(const std::array<BlockColumnInfo, n>& table, const BlockLayout& block,
+template <std::size_t kCount>
+void AppendColumns(const std::array<BlockColumnInfo, kCount>& table, const BlockLayout& block,
                    std::vector<Column>& columns) {
   for (const BlockColumnInfo& info : table) {
     for (Column& column : info.columns(block)) {
@@ -268,8 +268,8 @@ void AppendColumns(const std::array<BlockColumnInfo, n>& table, const BlockLayou
 }
 
 /// Writes the cells of one block.
-template <std::size_t n>
-void WriteCells(const std::array<BlockColumnInfo, n>& table, const BlockLayout& block,
+template <std::size_t kCount>
+void WriteCells(const std::array<BlockColumnInfo, kCount>& table, const BlockLayout& block,
                 const BlockRow& row, CsvFile& file) {
   for (const BlockColumnInfo& info : table) {
     const std::vector<double> numbers = info.numbers(block, row);

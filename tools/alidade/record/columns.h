@@ -32,8 +32,8 @@ struct ColumnInfo {
 };
 
 /// Appends the columns of a table.
-template <class Layout, class Row, std::size_t n>
-void AppendColumns(const std::array<ColumnInfo<Layout, Row>, n>& table, const Layout& layout,
+template <class Layout, class Row, std::size_t kCount>
+void AppendColumns(const std::array<ColumnInfo<Layout, Row>, kCount>& table, const Layout& layout,
                    std::vector<Column>& columns) {
   for (const ColumnInfo<Layout, Row>& info : table) {
     if (info.columns == nullptr) {
@@ -48,8 +48,8 @@ void AppendColumns(const std::array<ColumnInfo<Layout, Row>, n>& table, const La
 }
 
 /// Writes the cells of a table for one row. Does not end the row.
-template <class Layout, class Row, std::size_t n>
-void WriteCells(const std::array<ColumnInfo<Layout, Row>, n>& table, const Layout& layout,
+template <class Layout, class Row, std::size_t kCount>
+void WriteCells(const std::array<ColumnInfo<Layout, Row>, kCount>& table, const Layout& layout,
                 const Row& row, CsvFile& file) {
   for (const ColumnInfo<Layout, Row>& info : table) info.write(layout, row, file);
 }

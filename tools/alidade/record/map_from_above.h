@@ -21,7 +21,7 @@ class MapFromAbove {
   const std::optional<ViewMap>& map() const { return map_; }
 
  private:
-  std::array<double, 2> Of(const double* at) const { return {at[right_], at[up_]}; }
+  std::array<double, 2> Of(const double* point) const { return {point[right_], point[up_]}; }
   PlaneGaussian Of(const Eigen::Vector3d& mean, const Eigen::Matrix3d& p) const {
     return {mean[right_], mean[up_], p(right_, right_), p(right_, up_), p(up_, up_)};
   }

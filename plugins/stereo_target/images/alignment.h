@@ -253,7 +253,7 @@ class PatchAlignment {
 
   /// Returns the correlation of the patch and the sampled image, in [-1, 1].
   double Similarity() const {
-    double n = 0.0, a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
+    double n = 0.0, a = 0.0, b = 0.0, sum_aa = 0.0, sum_bb = 0.0, sum_ab = 0.0;
     for (int y = 1; y < patch_.rows - 1; ++y) {
       for (int x = 1; x < patch_.cols - 1; ++x) {
         if (!IsUsable(y, x)) continue;
@@ -261,13 +261,13 @@ class PatchAlignment {
         n += 1.0;
         a += p;
         b += s;
-        aa += p * p;
-        bb += s * s;
-        ab += p * s;
+        sum_aa += p * p;
+        sum_bb += s * s;
+        sum_ab += p * s;
       }
     }
-    const double variances = (aa - a * a / n) * (bb - b * b / n);
-    return variances > 0.0 ? (ab - a * b / n) / std::sqrt(variances) : 0.0;
+    const double variances = (sum_aa - a * a / n) * (sum_bb - b * b / n);
+    return variances > 0.0 ? (sum_ab - a * b / n) / std::sqrt(variances) : 0.0;
   }
 
   const cv::Mat& patch_;

@@ -8,7 +8,7 @@
 
 namespace alidade::bench {
 
-/// Row of a series: measurements of two image points at one depth.
+/// Row of a series: measurements of two image points that are at the same depth.
 struct PairRow {
   double t_s;
   double disparity_px;

@@ -10,7 +10,7 @@
 #include "alidade/estimation/ekf.h"
 #include "support/landmark_sensors.h"
 
-/// Small problems with landmarks, composed in C++. For tests.
+/// Small estimation problems that contain landmarks, composed in C++ for tests.
 namespace alidade::testing {
 
 /// Returns a problem with the block `cam.position` and the sensor `tracks`. The prior of the block

@@ -126,9 +126,9 @@ struct Numbers : std::span<const double> {
   friend bool operator==(const Numbers& a, const Numbers& b) { return std::ranges::equal(a, b); }
 };
 
-/// Result of one measurement. m: tangent size of the measurement (dof). The estimator stores the
-/// numbers, which are valid until the next frame. After a copy of an UpdateReport, the copy stores
-/// its own numbers. A view is empty if the quantity was not computed.
+/// Result of one measurement. m: tangent size of the measurement (dof). The numbers belong to the
+/// estimator and are valid until its next frame. A copy of an UpdateReport stores its own numbers.
+/// A view is empty if the quantity was not computed.
 struct MeasurementReport {
   MeasurementReport() = default;
   MeasurementReport(int sensor_index, Outcome result, std::int64_t landmark_id, int tangent_size)

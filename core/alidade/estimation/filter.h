@@ -46,8 +46,8 @@ struct EkfOptions {
   RejectionRecovery rejection_recovery = RejectionRecovery::kReset;
   int rejection_recovery_after = 20;  ///< consecutive rejections of one sensor
   int max_covariance_repairs = 10;    ///< the filter ends if one more repair is needed
-  /// A longer gap is divided into equal steps of at most this length, rounded to whole ns, at least
-  /// 1 ns.
+  /// A gap longer than this is divided into equal steps of at most this length. The length is
+  /// rounded to whole ns and is at least 1 ns.
   double max_dt_s = std::numeric_limits<double>::infinity();
 };
 

@@ -43,7 +43,7 @@ struct LandmarkOptions {
   static constexpr int kUnlimited = std::numeric_limits<int>::max();
 
   std::optional<Prior> prior;
-  /// A frame initialises new landmarks until it measures this number of landmarks in the state.
+  /// A frame initialises a new landmark only if it measures fewer landmarks of the state than this.
   int max_per_frame = kUnlimited;
   /// Number of the observation that initialises a landmark. 1: the first one.
   int min_observations = 1;

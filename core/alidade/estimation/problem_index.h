@@ -63,7 +63,8 @@ struct ProblemIndex {
 
   const Problem problem;
   const std::vector<StreamInfo> streams;
-  const State initial;  ///< has memory for every block with a prior
+  const State
+      initial;  ///< state before the first measurement; has space for all blocks with a prior
   std::vector<SensorPlace> sensor_places;
   std::vector<MotionPlace> motion_places;
   std::vector<int> stream_of_sensor;  ///< by sensor: index of the stream; -1: not in the source

@@ -11,8 +11,9 @@
 
 namespace alidade::internal {
 
-/// Reads the additional keys of a landmark sensor, the config entry `name`: the role `landmark` and
-/// `outlier_rejection`. Also creates the model of the sensor for the representation xyz. Errors:
+/// Reads the additional keys of the landmark sensor `name` from its config entry: the role
+/// `landmark`, and `outlier_rejection`. Also creates the model of the sensor for the representation
+/// xyz. Errors:
 /// kBadConfig.
 void ReadLandmarkKeys(const std::string& name, const Node& entry, const SensorModel& model,
                       const PluginHost& host, SensorOptions& options);

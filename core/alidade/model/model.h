@@ -14,7 +14,8 @@
 #include "alidade/model/params.h"
 
 /// Base classes of models. A model is a struct that derives from Sensor or Motion. The functions of
-/// a model are templates of the scalar type and have no side effects. A model needs only this
+/// a model that are differentiated are templated on the scalar type. No function has side effects.
+/// A model needs only this
 /// header and C++17, and can be used without a plugin.
 namespace alidade {
 

@@ -121,8 +121,8 @@ constexpr const GeometryRow* FindGeometry(std::uint32_t number) {
   return nullptr;
 }
 
-/// Calls f(G{}) with the struct G of the geometry that has this number. Returns false without a
-/// call for a vector and a product, which have no fixed size.
+/// Calls f(G{}); G is the struct of the geometry that has this number. Vectors and products have no
+/// fixed size: for these it returns false and does not call f.
 template <class F>
 bool VisitGeometry(std::uint32_t number, const F& f) {
   const auto visit = [&](const auto& row) {

@@ -130,7 +130,7 @@ struct CostKind {
   const Sensor& sensor;
   double scale = 1.0;
   bool isotropic = true;                   ///< true if W = scale I
-  RolePlace places[Traits::kMaxRoles];     ///< of the roles; each evaluation reads this array
+  RolePlace places[Traits::kMaxRoles];     ///< place of each role; read by each evaluation
   int strides[Traits::kMaxRoles] = {};     ///< row lengths of the Jacobians of the roles
   std::vector<int> sizes;                  ///< ambient sizes of the blocks
   std::vector<double> w;                   ///< W, row-major

@@ -16,7 +16,7 @@ namespace alidade {
 struct DisparityOptions {
   double max_px;          ///< largest disparity of the search
   double min_similarity;  ///< minimum correlation of both images of the target
-  double min_distinct;    ///< minimum lead of the best over the next correlation
+  double min_distinct;    ///< minimum lead of the best correlation over the second best
   double max_row_px;      ///< maximum difference of the rows of the target
   double max_sigma_px;    ///< maximum standard deviation of a disparity
 

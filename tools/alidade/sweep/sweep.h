@@ -54,8 +54,8 @@ struct FrameErrors {
   std::vector<double> rms;  ///< NaN for a frame without innovations
 };
 
-/// A row of runs.csv: the values of one EstimatorResult. Rows with equal names share the list of
-/// names.
+/// A row of runs.csv: the values of one EstimatorResult. Rows whose values have the same
+/// names share one list of names.
 struct SweepRow {
   SweepRow() = default;
   explicit SweepRow(const EstimatorResult& result)

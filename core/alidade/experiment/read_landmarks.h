@@ -13,8 +13,7 @@ namespace alidade::internal {
 
 /// Reads the additional keys of the landmark sensor `name` from its config entry: the role
 /// `landmark`, and `outlier_rejection`. Also creates the model of the sensor for the representation
-/// xyz. Errors:
-/// kBadConfig.
+/// xyz. Errors: kBadConfig.
 void ReadLandmarkKeys(const std::string& name, const Node& entry, const SensorModel& model,
                       const PluginHost& host, SensorOptions& options);
 

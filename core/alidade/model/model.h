@@ -15,8 +15,7 @@
 
 /// Base classes of models. A model is a struct that derives from Sensor or Motion. The functions of
 /// a model that are differentiated are templated on the scalar type. No function has side effects.
-/// A model needs only this
-/// header and C++17, and can be used without a plugin.
+/// A model needs only this header and C++17, and can be used without a plugin.
 namespace alidade {
 
 /// Name and unit of a quantity: a role, a measurement or a control input.

@@ -275,10 +275,10 @@ TEST_F(EvalCli, WarningsOfTheReferenceAreInJsonToo) {
   const Config json = Evaluated({"unsorted.tum", "mono.tum", "--quiet"});
   const Node warnings = json.root().At("evaluations").Items().front().At("warnings");
   ASSERT_FALSE(warnings.Items().empty());
-  EXPECT_TRUE(warnings.Items()[0].Text().starts_with("unsorted.tum:2 t: goes back"))
+  EXPECT_TRUE(warnings.Items()[0].Text().starts_with("unsorted.tum:2 t: is earlier"))
       << warnings.Items()[0].Text();
   const Outcome outcome = Call({"eval", "unsorted.tum", "mono.tum"});
-  EXPECT_EQ(outcome.err.find("goes back"), outcome.err.rfind("goes back")) << outcome.err;
+  EXPECT_EQ(outcome.err.find("is earlier"), outcome.err.rfind("is earlier")) << outcome.err;
 }
 
 TEST_F(EvalCli, AChoiceIsNamedAmongThoseThereAre) {

@@ -139,7 +139,7 @@ INSTANTIATE_TEST_SUITE_P(
               "double_cover",
               {"Initialise at", "q and -q of pose yield different results"}},
         Fault{0, "ignores_dt", "step", {"a step over dt = 0 without noise changes the state"}},
-        Fault{0, "euler", "step", {"apart in distance", "of order 2 in dt", "--step-order N"}},
+        Fault{0, "euler", "step", {"parts of dt differ by", "of order 2 in dt", "--step-order N"}},
         Fault{0, "euler_overstated", "step", {"of order 2 in dt, not 3", "kStepOrder = N"}},
         Fault{0, "drifts", "step", {"a step over dt = 0 without noise changes the state"}},
         Fault{0,

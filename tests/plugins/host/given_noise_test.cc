@@ -85,7 +85,7 @@ TEST_F(GivenNoise, IsRefusedWhereItIsNoCovarianceOfTheMeasurement) {
   refused({where, "not positive semi-definite"}, "covariance: [[1, 3], [3, 4]]");
   refused({where, "singular", "positive definite"}, "covariance: [[1, 2], [2, 4]]");
   refused({where, "singular", "positive definite"}, "covariance: [[0, 0], [0, 4]]");
-  refused({"test.yaml:20:15 sensors.pixels.sigma_px: ", "`covariance` too", "one of the two"},
+  refused({"test.yaml:20:15 sensors.pixels.sigma_px: ", "by `covariance`", "one of the two"},
           "covariance: [[1, 0], [0, 4]]\n    sigma_px: 1");
   refused({"sensors.pixels.sigma_px: missing", "px, > 0", "[u, v]"}, "use_less: 1");
 }
@@ -144,7 +144,7 @@ TEST_F(GivenNoise, OfAMotionModelIsRefusedWhereItDoesNotFit) {
   refused("constant_velocity", "noise: {covariance: [[1]]}", continuous);
   refused("constant", "noise: {covariance: [[1]]}", continuous);
   refused("constant_velocity", "noise: {kind: discrete, acceleration: 1, covariance: [[1]]}",
-          {"noise.acceleration: ", "`covariance` too", "one of the two"});
+          {"noise.acceleration: ", "by `covariance`", "one of the two"});
   refused("quaternion_pose", "noise: {kind: discrete, covariance: [[1]]}",
           {"noise.covariance: has 1 item", "6 rows of 6"});
 }

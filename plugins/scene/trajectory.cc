@@ -125,9 +125,8 @@ Vector ReadSigmas(const Node& node) {
 /// Draws a random trajectory with the discrete steps of quaternion_pose.
 std::vector<CameraState> DrawTrajectory(const Node& node, std::size_t count, double dt_s,
                                         Random& random) {
-  const QuaternionPose model(
-      ReadSigmas(node.At("linear_acceleration", "a trajectory that is drawn")),
-      ReadSigmas(node.At("angular_acceleration", "a trajectory that is drawn")));
+  const QuaternionPose model(ReadSigmas(node.At("linear_acceleration", "a random trajectory")),
+                             ReadSigmas(node.At("angular_acceleration", "a random trajectory")));
   CameraState state;
   const auto read = [&](const char* key, Vector& destination) {
     if (const auto entry = node.Find(key)) destination = ToArray(ReadVector(*entry));

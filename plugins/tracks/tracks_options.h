@@ -34,10 +34,10 @@ struct TracksOptions {
                                 "features of earlier frames are omitted from all frames", 0,
                                 1 << 30, 0)),
         max_frames(p.Integer("max_frames", "maximum number of frames; 0: all", 0, 1 << 30, 0)),
-        odometry(static_cast<Odometry>(
-            p.Choice("odometry", {"none", "zero_order_hold", "mean"},
-                     "odometry of a frame: none, its row, or the mean with the next frame's row",
-                     kZeroOrderHold))),
+        odometry(static_cast<Odometry>(p.Choice(
+            "odometry", {"none", "zero_order_hold", "mean"},
+            "odometry of a frame: none, its row, or the mean of its row and the next frame's row",
+            kZeroOrderHold))),
         tolerance(TimestampFromSeconds(
             p.Number("truth_tolerance_s", "s",
                      "maximum time difference of the true pose of a frame", {0.0, 1e3}, 1e-3))),

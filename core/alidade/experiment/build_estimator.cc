@@ -297,7 +297,7 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
     const auto rollback = order ? order->Find("policy") : std::nullopt;
     if (spec.on_plugin_failure == OnPluginFailure::kDisable && rollback &&
         rollback->Text() == "rollback") {
-      policy->Fail("a rollback would process earlier frames again with the disabled sensor",
+      policy->Fail("a rollback would use the disabled sensor again for earlier frames",
                    "skip or abort, or another out_of_sequence.policy");
     }
   }

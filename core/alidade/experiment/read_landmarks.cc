@@ -130,7 +130,7 @@ void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBind
   if (sensor.model->inverse().prior_size > 1) {
     model.Fail("model '" + sensor.model->name() + "' needs a prior of " +
                    std::to_string(sensor.model->inverse().prior_size) + " numbers",
-               "a model with a prior of one number, the inverse distance, or without a prior");
+               "a model without a prior, or with a prior of one number (the inverse distance)");
   }
   const auto is_same = [](const Space& a, const Space& b) {
     return a.name == b.name && a.geometry == b.geometry;

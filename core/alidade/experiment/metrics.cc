@@ -82,10 +82,16 @@ struct Metrics::Impl {
     template <class Sample>
     void Add(std::optional<double> (*MetricInfo::*function)(const Sample&), std::size_t index,
              const Sample& sample) {
-      for (std::size_t m = 0; m < kMetrics.size(); ++m) {
-        const auto sampled = kMetrics[m].*function;
-        if (sampled == nullptr || (!segment.empty() && !kMetrics[m].has_segments)) continue;
-        const std::optional<double> value = sampled(sample);
+      static const std::vector<std::size_t> sampled = [&] {  // a sample type has one member
+        std::vector<std::size_t> metrics_of_type;
+        for (std::size_t m = 0; m < kMetrics.size(); ++m) {
+          if (kMetrics[m].*function != nullptr) metrics_of_type.push_back(m);
+        }
+        return metrics_of_type;
+      }();
+      for (const std::size_t m : sampled) {
+        if (!segment.empty() && !kMetrics[m].has_segments) continue;
+        const std::optional<double> value = (kMetrics[m].*function)(sample);
         if (!value) continue;
         if (metrics[m].size() <= index) metrics[m].resize(index + 1);
         metrics[m][index].Add(*value);

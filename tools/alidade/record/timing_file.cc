@@ -9,17 +9,16 @@
 namespace alidade::internal {
 TimingFile::TimingFile(const OutputFolder& folder, const Experiment& experiment,
                        RunColumns& run_columns) {
-  TimingLayout layout;
   for (const EstimatorSpec& spec : experiment.estimators) {
     const bool offline = spec.estimator->offline();
     column_of_.push_back(offline ? -1 : static_cast<int>(times_.size()));
     if (offline) continue;
     times_.push_back({spec.name});
-    layout.estimators.push_back(spec.name);
+    layout_.estimators.push_back(spec.name);
   }
   row_.resize(times_.size());
   std::vector<Column> columns;
-  AppendColumns(kTimingColumns, layout, columns);
+  AppendColumns(kTimingColumns, layout_, columns);
   file_ = CreateCsv(folder, "timing.csv", std::move(columns), run_columns);
 }
 
@@ -39,7 +38,7 @@ void TimingFile::EndRow() {
   const Timestamp timestamp =
       std::exchange(timestamp_, kNoTimestamp);  // write only once, even if the write fails
   if (timestamp == kNoTimestamp) return;
-  WriteCells(kTimingColumns, TimingLayout{}, {timestamp, row_}, *file_);
+  WriteCells(kTimingColumns, layout_, {timestamp, row_}, *file_);
   std::ranges::fill(row_, std::nullopt);
   file_->EndRow();
 }

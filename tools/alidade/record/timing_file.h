@@ -31,6 +31,7 @@ class TimingFile {
   std::vector<int> column_of_;              ///< column of each estimator; -1: none
   std::vector<std::optional<double>> row_;  ///< time in each column
   Timestamp timestamp_ = kNoTimestamp;      ///< timestamp of the current row
+  TimingLayout layout_;
   std::optional<CsvFile> file_;
 };
 

@@ -20,9 +20,10 @@ constexpr const char* kBundleFooter = R"(Examples:
   alidade bundle bundle.out --fix intrinsics -o runs/bundler
   alidade bundle data/tracks.csv --camera data/calibration.yaml --start run/trajectory.tum -o runs/a
 
-Reads BAL, Bundler v0.3 and libmv problems, whose format is detected from the first bytes, and
-tracks that `simulate` writes. Ctrl-C stops after the current iteration and keeps the result so far.
-Exit codes: 0 converged, 1 out of iterations, 75 stopped, 79 the solver failed.)";
+PROBLEM is a file in the format BAL, Bundler v0.3 or libmv, which is detected from the first bytes,
+or a file of tracks that `alidade simulate` wrote. Ctrl-C stops after the current iteration; the
+result of this iteration is kept. Exit code 0: converged; 1: the maximum number of iterations was
+reached; 75: a signal stopped the solver; 79: the solver failed.)";
 
 struct BundleArguments {
   std::string problem, folder, loss;
@@ -63,7 +64,7 @@ std::string IsLoss(const std::string& text) {
            " to " + Short(kBundleLossScaleMax) + " standard deviations";
   }
   return "'" + text + "' is not a loss; expected " + internal::Join(internal::NamesOf(kLosses)) +
-         ", or NAME=SCALE, in standard deviations";
+         ", or NAME=SCALE with the scale in standard deviations";
 }
 
 /// Splits a text such as `k1,k2` at its commas.
@@ -105,22 +106,20 @@ std::string Describe(const BundleFile& file, int left_out) {
                      std::to_string(problem.points.size()) + " points, " +
                      std::to_string(problem.observations.size()) + " observations";
   if (left_out > 0) {
-    text += "; " + std::to_string(left_out) +
-            " left out, because the residual is undefined or not finite at the start: " +
-            (IsProjective(file.format) ? "in the camera's plane" : "behind the camera");
+    text += "; excluded observations: " + std::to_string(left_out) + " of points " +
+            (IsProjective(file.format) ? "in the plane of the camera" : "behind the camera") +
+            ", with residuals that are undefined or not finite at the start";
   }
   if (file.invalid_observations > 0)
-    text += "; " + std::to_string(file.invalid_observations) +
-            " are invalid, for example outside the image";
+    text += "; invalid observations: " + std::to_string(file.invalid_observations) +
+            ", for example outside the image";
   if (file.frames_left_out > 0)
-    text +=
-        "; " + std::to_string(file.frames_left_out) + " frames left out, because they have no pose";
+    text += "; excluded frames without a pose: " + std::to_string(file.frames_left_out);
   if (file.points_left_out > 0)
-    text += "; " + std::to_string(file.points_left_out) +
-            " points left out, because they have no parallax";
+    text += "; excluded points without parallax: " + std::to_string(file.points_left_out);
   if (file.unplaced_observations > 0)
-    text += "; " + std::to_string(file.unplaced_observations) +
-            " observations of these frames and points left out";
+    text += "; excluded observations of these frames and points: " +
+            std::to_string(file.unplaced_observations);
   return text;
 }
 
@@ -151,7 +150,7 @@ ExitCode RunBundle(const BundleArguments& arguments) {
   if (left_out == std::ssize(file.problem.observations)) {
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{arguments.problem}, {}, "no observation can be used",
-                          IsProjective(file.format) ? "points too near the plane of their camera"
+                          IsProjective(file.format) ? "points outside the plane of their camera"
                                                     : "points in front of their camera") +
                     "\n  " + Describe(file, left_out));
   }
@@ -186,7 +185,8 @@ ExitCode RunBundle(const BundleArguments& arguments) {
   if (!arguments.quiet) Print(text);
   if (result.end == BundleEnd::kFailed) PrintErrors(arguments.problem + ": " + result.message);
   if (result.end == BundleEnd::kOutOfIterations)
-    PrintNote("not converged: " + result.message + " (--max-iterations, --tolerance)");
+    PrintNote("the adjustment has not converged: " + result.message +
+              " (options: --max-iterations, --tolerance)");
   return CodeOf(result.end);
 }
 
@@ -197,11 +197,11 @@ void AddBundle(CLI::App& program, Action& action) {
       "bundle",
       "Adjust cameras and points to minimise the reprojection error: BAL, Bundler, libmv, tracks");
   const auto arguments = std::make_shared<BundleArguments>();
-  command.add_option("PROBLEM", arguments->problem, "file of the problem; `-` for standard input")
+  command.add_option("PROBLEM", arguments->problem, "file to solve; `-` for standard input")
       ->option_text(" ")
       ->required()
       ->check(IsNonEmpty);
-  AddOutput(command, arguments->folder, "folder for the solution; default: nothing is written");
+  AddOutput(command, arguments->folder, "output folder; default: nothing is written");
   const auto add = [&](const char* name, auto& value, const char* text, const std::string& help) {
     return command.add_option(name, value, help)->option_text(text);
   };
@@ -216,12 +216,12 @@ void AddBundle(CLI::App& program, Action& action) {
   add("--max-iterations", arguments->iterations, "N", "maximum number of iterations; default 500")
       ->check(IsInteger(0, 1000000));
   add("--tolerance", arguments->tolerance, "X",
-      "largest relative change of the cost in a step that counts as converged; default 1e-8")
+      "relative change of the cost per step below which the solver has converged; default 1e-8")
       ->check(IsNumber(0.0, 1.0));
-  CLI::Option* const camera =
-      add("--camera", arguments->tracks.camera, "FILE", "for tracks: YAML file with `camera`");
-  CLI::Option* const start =
-      add("--start", arguments->tracks.start, "FILE", "for tracks: initial trajectory, TUM");
+  CLI::Option* const camera = add("--camera", arguments->tracks.camera, "FILE",
+                                  "for tracks: YAML file that contains `camera`");
+  CLI::Option* const start = add("--start", arguments->tracks.start, "FILE",
+                                 "for tracks: file of the initial trajectory (TUM)");
   camera->needs(start);
   start->needs(camera);
   AddPluginPath(command, arguments->plugin_paths);

@@ -22,8 +22,8 @@ constexpr const char* kCheckFooter = R"(Examples:
   alidade check stereo_disparity --config examples/05_depth_principled/config.yaml
 
 Each check prints one line: ok, FAIL or skipped, and the observation. If a plugin crashes, exits,
-hangs or uses too much memory, only that check fails. Exit code 1: a check failed; 78: a parameter
-is missing or wrong. For a plugin with several models, use `--set MODEL.key=value`.)";
+hangs or uses too much memory, only the current check fails. Exit code 1: a check failed; 78: a
+parameter is missing or wrong. For a plugin with several models, use `--set MODEL.key=value`.)";
 
 struct CheckArguments {
   std::string plugin, model, config;
@@ -57,7 +57,7 @@ void RequireModels(const CheckArguments& arguments, const std::vector<PluginEntr
     if (entries.size() == 1 || std::any_of(entries.begin(), entries.end(), names_model)) continue;
     throw Error(ExitCode::kBadConfig,
                 ErrorLine({"--set"}, set.substr(0, set.find('=')), "the model is missing",
-                          "MODEL.key=value, because the plugin has several; or name the MODEL"));
+                          "MODEL.key=value or the argument MODEL for a plugin of several models"));
   }
 }
 
@@ -99,7 +99,7 @@ bool CheckAllAndPrint(const std::vector<PluginEntry>& entries, const CheckArgume
     } catch (const Error& e) {
       if (e.code() != ExitCode::kBadConfig) throw;
       throw Error(e.code(), NameModelInErrors(entry.name, e.what()) +
-                                "\n  parameters are given with --set " +
+                                "\n  to set a parameter, use --set " +
                                 (entries.size() == 1 ? "" : entry.name + '.') + "KEY=VALUE");
     }
   }
@@ -128,7 +128,7 @@ bool CheckAllAndPrint(const std::vector<PluginEntry>& entries, const Config& con
   if (!found) {
     std::string models;
     for (const PluginEntry& entry : entries) models += (models.empty() ? "" : ", ") + entry.name;
-    config.root().Fail("no entry of `state` and `sensors` has a model of the plugin",
+    config.root().Fail("no entry of `state` or `sensors` uses a model of the plugin",
                        "an entry with model: " + models);
   }
   return failed;
@@ -153,8 +153,8 @@ ExitCode Check(const CheckArguments& arguments) {
 }  // namespace
 
 void AddCheck(CLI::App& program, Action& action) {
-  CLI::App& command =
-      *program.add_subcommand("check", "Check that the models of a plugin obey the model rules");
+  CLI::App& command = *program.add_subcommand(
+      "check", "Check that the models of a plugin follow the rules for models");
   const auto arguments = std::make_shared<CheckArguments>();
   CheckOptions& options = arguments->options;
   command
@@ -184,7 +184,7 @@ void AddCheck(CLI::App& program, Action& action) {
   command
       .add_option(
           "--step-order", options.step_order,
-          "accept a Step that is additive in dt only to this order (2: Euler); default: the order "
+          "order in dt to which Step must be additive (2 for Euler steps); default: the order "
           "that the model declares")
       ->option_text("N")
       ->check(IsInteger(1, 8));

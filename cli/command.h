@@ -41,7 +41,7 @@ void AddDoctor(CLI::App& program, Action& action);
 /// Arguments that name a config and the plugins that the config needs.
 struct Input {
   std::string config;
-  std::vector<std::string> sets;  ///< `key=value` each, applied in this order
+  std::vector<std::string> sets;  ///< assignments `key=value`, applied in this order
   std::vector<std::string> plugin_paths;
   bool allow_outside = false;
 
@@ -54,8 +54,8 @@ struct Input {
   /// `config` nor `other_configs` need.
   PluginHost HostFor(const Config& config, const std::vector<Config>& other_configs = {}) const;
   /// Returns the text of inputs.json for a command with these arguments (internal::CommandInputs).
-  /// `runs` are the configs of the command's runs. `plugins` are the plugins that these configs
-  /// use.
+  /// `runs` are the configs of the command's runs. `plugins` are the hashes of the plugins that
+  /// these configs use.
   std::string InputsText(const Config& config, const std::vector<std::string>& arguments,
                          const std::vector<Config>& runs,
                          const internal::PluginHashes& plugins) const;
@@ -78,29 +78,30 @@ std::function<std::string(const std::string&)> IsInteger(std::int64_t minimum,
                                                          std::int64_t maximum);
 std::function<std::string(const std::string&)> IsNumber(double minimum, double maximum);
 
-/// Prints that a sweep was stopped after `done` of `runs` runs, followed by `more`.
+/// Prints that a sweep was stopped after `done` of `runs` runs. Appends `more` to this message.
 void ReportStopped(std::size_t done, std::int64_t runs, const std::string& more = "");
 
 /// Returns the absolute path, with links resolved as far as possible. All names of one file yield
 /// the same path.
 std::filesystem::path Resolved(const std::string& path);
 
-/// Rejects an output folder if it or its `.partial` folder contains, or is, an input of the
-/// command, because --force would delete this input. Paths may be empty. Error: kCannotCreate.
+/// Rejects an output folder if this folder or its `.partial` folder is or contains an input of the
+/// command, because --force would delete the input. Paths may be empty. Error: kCannotCreate.
 void ProtectInputs(const std::string& output, const std::vector<std::string>& inputs);
 
-/// Output folder of a command. `preferred` is the folder that the command uses unless that folder
-/// already exists.
+/// Output folder of a command. `preferred` is the folder that the command uses if this folder does
+/// not exist yet.
 struct Output {
   std::filesystem::path folder, preferred;
 };
-/// Chooses the output folder. The preferred folder is `requested` or, if that is empty, the
-/// config's `output:` inside runs/. If both are missing, it is runs/PREFIX followed by the name of
-/// the config: the name of its folder if the file is called config.yaml, else the stem of the file.
-/// If `requested` is empty, `force` is false, and the preferred folder or its `.partial` exists,
-/// chooses the first of NAME-2, NAME-3, ... for which neither exists. Errors: kCannotCreate if
-/// `requested` is runs/ itself, or if the output would replace the config or its inputs;
-/// kNotTrusted, kBadConfig.
+/// Chooses the output folder. The preferred folder is `requested`. If `requested` is empty, the
+/// preferred folder is the config's `output:` inside runs/. If both are missing, the preferred
+/// folder is in runs/, and its name is `prefix` followed by the name of the config: the name of the
+/// config's folder if the file is called config.yaml, else the stem of the file. If `requested` is
+/// empty and `force` is false, an existing folder is not replaced: if FOLDER or FOLDER.partial
+/// exists, the function chooses the first of FOLDER-2, FOLDER-3, ... for which neither exists.
+/// Errors: kCannotCreate if `requested` is runs/ itself, or if the output would replace the config
+/// or its inputs; kNotTrusted, kBadConfig.
 Output OutputFolder(const std::string& requested, const Config& config, const Input& input,
                     bool force, const std::string& prefix = "");
 /// Prints a note if the output folder is not the preferred one. Must be called after the config was

@@ -23,18 +23,18 @@ namespace fs = std::filesystem;
 
 constexpr const char* kCompareFooter = R"(Examples:
   alidade compare config.yaml                      run the config and decompose a filter's error
-  alidade compare config.yaml --runs 100           over seeds 1 to 100
-  alidade compare config.yaml --runs 200 --budget 600   as many runs as ten minutes allow
+  alidade compare config.yaml --runs 100           compare over seeds 1 to 100
+  alidade compare config.yaml --runs 200 --budget 600   do as many runs as 10 min allow
   alidade compare config.yaml --no-decomposition --reference batch
-  alidade compare runs/a runs/b                    finished runs over the same data
+  alidade compare runs/a runs/b                    compare finished runs over the same data
 
-Exit code 1: no reference or no measurement was available for the comparison; 65: the runs are over
+Exit code 1: no reference or no measurement was available for the comparison; 65: the runs used
 different data.)";
 
 struct CompareArguments {
   std::string command;             ///< complete command line
-  Input input;                     ///< input options; the config is in `paths`
-  std::vector<std::string> paths;  ///< path of one config, or of several folders
+  Input input;                     ///< input options; `paths` contains the config
+  std::vector<std::string> paths;  ///< path of one config, or paths of folders
   std::string folder;
   std::optional<std::uint64_t> seed;
   SweepOptions sweep;
@@ -52,15 +52,15 @@ std::string FormatComparison(const Comparison& comparison, const CompareArgument
                        arguments.all ? ReportRows::kAll : ReportRows::kMain);
 }
 
-/// Prints the comparison and the folder that contains it.
+/// Prints the comparison, and the path of the folder that contains the comparison.
 void Report(const Comparison& comparison, const CompareArguments& arguments,
             const fs::path& folder) {
   Print(FormatComparison(comparison, arguments));
   if (!folder.empty() && !arguments.quiet) PrintNote("wrote " + folder.string());
 }
 
-/// Returns the exit code. If the comparison is withheld, its code replaces that of a failed
-/// estimator or seed, but not that of any other failure of the run.
+/// Returns the exit code of the command. If the comparison is withheld, prints the reason. The code
+/// is then kFound, unless the run failed for another reason than a failed estimator or seed.
 ExitCode CodeOf(const Comparison& comparison, ExitCode run_code) {
   const bool is_minor =
       run_code == ExitCode::kOk || run_code == ExitCode::kDiverged || run_code == ExitCode::kFound;
@@ -69,8 +69,8 @@ ExitCode CodeOf(const Comparison& comparison, ExitCode run_code) {
   return ExitCode::kFound;
 }
 
-/// Returns true if all failed estimators are ones that the comparison added. The comparison then
-/// reports these failures.
+/// Returns true if the comparison added all estimators that failed. The comparison then reports
+/// these failures.
 bool OnlyAddedFailed(const RunResult& result, const ComparedExperiment& compared) {
   return result.code == ExitCode::kDiverged &&
          std::ranges::all_of(result.estimators, [&](const EstimatorResult& estimator) {
@@ -92,7 +92,8 @@ std::string DurationText(double s) {
                     : internal::RoundedText(s / 3600.0, 2) + " h";
 }
 
-/// Forecast of the total duration. It is printed once, and only if it is at least 10 s.
+/// Forecast of the total duration. The forecast is printed at most once, and only if it is at least
+/// 10 s.
 class Forecast {
  public:
   Forecast(const CompareArguments& arguments, std::int64_t jobs, Progress& progress)
@@ -107,9 +108,9 @@ class Forecast {
     Report(rounds * elapsed_s(), "the first of " + std::to_string(total) + " runs took " +
                                      DurationText(elapsed_s()) + ": all runs may take ");
   }
-  /// Computes the forecast after the first seconds. The forecast is a lower bound: a batch that
-  /// solves at each frame has more data each time, and a batch of all data is solved after the last
-  /// frame.
+  /// Computes the forecast after the first seconds. The forecast is a lower bound, because a batch
+  /// that solves at each frame processes more data at each frame, and a batch of all data is solved
+  /// after the last frame.
   void UpdateFromFrames(std::int64_t done, std::int64_t total) {
     if (total <= 0 || elapsed_s() < 2.0) return;
     Report(elapsed_s() * static_cast<double>(total) / static_cast<double>(done),
@@ -128,7 +129,7 @@ class Forecast {
     if (forecast_s < kMinReported_s) return;
     progress_.Clear();
     PrintNote(prefix + DurationText(forecast_s) +
-              (budget_s_ ? ", the budget is " + DurationText(*budget_s_) : ""));
+              (budget_s_ ? "; the budget is " + DurationText(*budget_s_) : ""));
   }
 
   Progress& progress_;
@@ -162,7 +163,7 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   Comparison comparison;
   try {
     comparison = comparer.Finish(result, run_options);
-  } catch (const Error&) {  // the run remains, and its own failure is reported first
+  } catch (const Error&) {  // the run is still recorded, and its failure is reported
     recorder.Finish(result);
     if (result.status == RunStatus::kOk) throw;
     if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
@@ -217,7 +218,7 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExper
   if (has_results) AddFiles(sweep_folder, comparison);
   if (has_results)
     figure_note = WriteSeedReport(sweep_folder.files(), comparison, compared.config, StopRequested);
-  if (!figure_note.empty()) Log(LogLevel::kWarning, "figures: " + figure_note);
+  if (!figure_note.empty()) Log(LogLevel::kWarning, "no figure was drawn: " + figure_note);
   sweep_folder.Write(seeds.sweep, Summarise(seeds.sweep), compared.config);
   if (has_results) Report(comparison, arguments, folder);
   if (seeds.sweep.stopped && seeds.beyond_budget == 0) {
@@ -272,7 +273,8 @@ void RejectRunOptions(const CLI::App& command) {
   for (const char* option : {"--runs", "--first-seed", "--jobs", "--seed", "--set", "--plugin-path",
                              "--allow-outside", "--figures", "--budget"}) {
     if (command.count(option) == 0) continue;
-    throw CLI::ValidationError(option, "not supported for finished runs; expected a config");
+    throw CLI::ValidationError(option,
+                               "finished runs do not support this option; expected a config");
   }
 }
 
@@ -284,15 +286,15 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
       ->check(IsNonEmpty);
   command
       .add_option("--reference", arguments.options.reference,
-                  "compute errors from truth, or from an estimator; default: truth if it is "
+                  "reference of the errors: truth, or an estimator; default: truth if truth is "
                   "known, else the batch")
       ->option_text("truth|NAME");
   command
       .add_option("--filter", arguments.options.filter,
-                  "the filter whose error is decomposed; default: the first filter")
+                  "filter whose error is decomposed; default: the first filter")
       ->option_text("NAME");
   command.add_flag("--no-decomposition", arguments.no_decomposition,
-                   "do not decompose the error, and do not add the estimators that this needs");
+                   "do not decompose the error, and do not add estimators for the decomposition");
   command.add_option("--runs", arguments.sweep.runs, "compare over N seeds")
       ->option_text("N")
       ->check(IsInteger(1, 1'000'000));
@@ -310,19 +312,19 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
       ->needs("--runs");
   command
       .add_option("--budget", arguments.options.budget_s,
-                  "time in s: do not start a run that would end later; in one run, do not add an "
-                  "estimator that would take longer")
+                  "time limit in s: do not start a run that would exceed the limit; in a single "
+                  "run, do not add an estimator that would exceed the limit")
       ->option_text("SECONDS")
       ->check(IsNumber(1e-9, 1e9));
   AddSeed(command, arguments.seed)->excludes("--first-seed");
   AddSets(command, arguments.input.sets,
-          "set a key of the config, in dotted form; may be repeated");
+          "set a key of the config, such as source.seed=7; may be repeated");
   AddPluginPath(command, arguments.input.plugin_paths);
   command.add_flag("--allow-outside", arguments.input.allow_outside,
-                   "allow the paths of `include:` and `output:` to leave their folders");
+                   "allow paths in `include:` and `output:` that lead out of their folders");
   AddOutput(command, arguments.folder,
-            "folder; default for a config: its `output:`, or compare-NAME, in runs/; for folders: "
-            "nothing is written");
+            "output folder; default for a config: `output:` of the config, or compare-NAME, in "
+            "runs/; default for folders: nothing is written");
   command.add_flag("--force", arguments.force, "replace the folder if it exists");
   command.add_flag("--all", arguments.all, "print all rows of the tables");
   command.add_flag("--json", arguments.json, "print all values as JSON");

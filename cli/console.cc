@@ -19,7 +19,7 @@ namespace alidade::cli {
 namespace {
 
 std::atomic<bool> stop_requested{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets stop_requested");
 
 /// Requests a stop at the first signal. The second signal ends the process.
 extern "C" void HandleStop(int signal_number) {
@@ -154,7 +154,7 @@ void StopOnSignals() {
   ::sigaction(SIGTERM, &action, nullptr);
   struct sigaction hangup {};
   ::sigaction(SIGHUP, nullptr, &hangup);
-  if (hangup.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);  // false under nohup
+  if (hangup.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);  // nohup ignores SIGHUP
 }
 
 bool StopRequested() { return stop_requested; }

@@ -10,15 +10,15 @@
 
 namespace alidade::cli {
 
-/// Disables the signals of two failed writes: to a closed pipe, and beyond the size limit of a
-/// file. Such a write then reports an error instead of ending the process.
+/// Ignores SIGPIPE and SIGXFSZ. A write to a closed pipe, or beyond the size limit of a file, then
+/// reports an error instead of ending the process.
 void PrepareConsole();
 
 /// Writes `text` to standard output. Error: kIo if a byte cannot be written.
 void Print(std::string_view text);
 
 /// Prints `error: LINE` on standard error for each line. An indented line continues the line above.
-/// Prints `?` for each control character and each byte that is not UTF-8, as PrintNote does.
+/// PrintErrors and PrintNote print `?` for each control character and each byte that is not UTF-8.
 void PrintErrors(std::string_view text);
 void PrintNote(std::string_view text);
 
@@ -45,8 +45,8 @@ class Progress {
   std::chrono::steady_clock::time_point next_;
 };
 
-/// Installs handlers for SIGINT, SIGTERM and, unless it is ignored, SIGHUP. The first signal
-/// requests that the command stop. A second signal ends the process at once.
+/// Installs a handler for SIGINT, SIGTERM and SIGHUP. An ignored SIGHUP remains ignored. The first
+/// signal requests that the command stop. A second signal ends the process at once.
 void StopOnSignals();
 bool StopRequested();
 

@@ -22,10 +22,10 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kDoctorFooter =
-    R"(Each line is ok, warn or fail, with a remedy if one is needed. The exit code is 1 if a line
-is fail, else 0.)";
+    R"(Each line starts with ok, warn or fail. A remedy follows if one is needed. The exit code is 1
+if a line starts with fail, else 0.)";
 
-/// Lines that the doctor prints.
+/// Lines that `alidade doctor` prints.
 class Diagnosis {
  public:
   void Ok(const std::string& text) { text_ += "ok    " + text + '\n'; }
@@ -86,13 +86,14 @@ void CheckVersions(Diagnosis& diagnosis) {
 std::string RemedyFor(const Refusal& refusal) {
   const std::string file = refusal.file.string();
   if (refusal.code == ExitCode::kNotTrusted) {
-    return "if you trust it: chmod go-w '" + file + "' and the folders above it, chown to yourself";
+    return "if you trust the file: chmod go-w '" + file +
+           "' and the folders above it, and chown all of them to your user";
   }
-  return "rebuild it for this alidade, or remove it";
+  return "rebuild the plugin for this version of alidade, or remove the file";
 }
 
-/// Reports whether the batch estimator was built. The build omits it if its solver is not
-/// installed.
+/// Reports whether the batch estimator was built. The build omits the batch estimator if the Ceres
+/// solver is not installed.
 void CheckBatch(const PluginHost& host, Diagnosis& diagnosis) {
   const auto is_batch = [](const PluginEntry& entry) {
     return entry.kind == kEstimatorKind && EstimatorOf(entry).kind == EstimatorKind::kBatch;
@@ -110,7 +111,8 @@ void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
   const PluginHost host(Absolute(paths), OnRefusal::kList);
   for (const std::string& place : host.searched()) diagnosis.Ok("searched " + place);
   for (const Refusal& refusal : host.refusals()) {
-    diagnosis.Warn("refused " + refusal.file.string() + ": " + refusal.reason, RemedyFor(refusal));
+    diagnosis.Warn("plugin " + refusal.file.string() + " was refused: " + refusal.reason,
+                   RemedyFor(refusal));
   }
   const auto count = [&](const char* kind) {
     return static_cast<int>(std::ranges::count(host.entries(), kind, &PluginEntry::kind));
@@ -151,11 +153,11 @@ void CheckEnvironment(Diagnosis& diagnosis) {
                    "apt-get install gnuplot-nox");
   }
   const char* const data = std::getenv("ALIDADE_DATA");
-  const std::string remedy =
-      "export ALIDADE_DATA=FOLDER, the folder that contains kitti-depth-pairs";
+  const std::string remedy = "export ALIDADE_DATA=FOLDER; FOLDER must contain kitti-depth-pairs";
   std::error_code error;
   if (data == nullptr || *data == '\0') {
-    diagnosis.Warn("ALIDADE_DATA is not set: examples on real recordings need it", remedy);
+    diagnosis.Warn("ALIDADE_DATA is not set: examples with real recordings need this variable",
+                   remedy);
   } else if (!fs::is_directory(data, error)) {
     diagnosis.Warn(std::string("ALIDADE_DATA is not a folder: ") + data, remedy);
   } else {
@@ -163,8 +165,8 @@ void CheckEnvironment(Diagnosis& diagnosis) {
   }
 }
 
-/// Reports whether the current folder is writable. Creates a folder to test this, because
-/// permissions do not show that a file system is read-only or full.
+/// Reports whether the current folder is writable. Creates a temporary folder for this test,
+/// because permissions do not show that a file system is read-only or full.
 void CheckCurrentFolder(Diagnosis& diagnosis) {
   std::string name = ".alidade-doctor-XXXXXX";
   if (::mkdtemp(name.data()) != nullptr) {

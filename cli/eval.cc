@@ -16,13 +16,14 @@ namespace {
 constexpr const char* kEvalFooter = R"(Examples:
   alidade eval runs/slam                           compare a run's estimators with its truth
   alidade eval truth.tum estimate.tum -a           ATE and RPE after se3 alignment
-  alidade eval truth.tum mono.tum -as              with scale too, for a single camera
+  alidade eval truth.tum mono.tum -as              also align the scale, for a single camera
   alidade eval KITTI_00_gt.txt KITTI_00_orb.txt -a -d 100 -u m --all-pairs
   alidade eval truth.tum a.tum b.tum -a --markdown
 
-Files: TUM (8 columns, or 20 with covariances), KITTI (12, and times.txt), EuRoC (csv). A folder
-is a run, an estimator of a run, or an EuRoC sequence. Warnings are printed on standard error.
-Options have the names of evo; underscores, as in --t_max_diff, are accepted.)";
+Formats of files: TUM (8 columns, or 20 with covariances), KITTI (12 columns, and times.txt) and
+EuRoC (csv). A folder can be a run, an estimator of a run, or an EuRoC sequence. Warnings are
+printed on standard error. Options have the names that evo uses. Underscores, as in --t_max_diff,
+are also accepted.)";
 
 enum class OutputFormat { kText, kJson, kMarkdown, kLatex };
 
@@ -112,7 +113,8 @@ Evaluation Failed(const Trajectory& reference, const TrajectoryFile& file,
   return failed;
 }
 
-/// Returns true if the only argument is a run. Its estimates are then compared with its own truth.
+/// Returns true if the only argument is a run. The estimates of this run are then compared with the
+/// truth of the run.
 bool IsSingleRun(const EvalArguments& arguments) { return arguments.estimates.empty(); }
 
 std::vector<TrajectoryFile> FilesOf(const EvalArguments& arguments) {
@@ -162,13 +164,13 @@ ExitCode RunEval(const EvalArguments& arguments) {
 void CheckCombinations(const EvalArguments& arguments) {
   const PairOptions& pairs = arguments.options.pairs;
   if (pairs.unit == DeltaUnit::kFrames && pairs.delta != std::floor(pairs.delta)) {
-    throw CLI::ValidationError("--delta: not a whole number of frames; expected an integer");
+    throw CLI::ValidationError("--delta: a number of frames must be whole; expected an integer");
   }
   const Alignment alignment = SelectedAlignment(arguments);
   if (arguments.options.align_poses > 0 &&
       (alignment == Alignment::kNone || alignment == Alignment::kOrigin)) {
-    throw CLI::ValidationError("--n-to-align: " + std::string(ToString(alignment)) +
-                               " does not use N poses; expected -a, -s or --align-mode too");
+    throw CLI::ValidationError("--n-to-align: alignment '" + std::string(ToString(alignment)) +
+                               "' does not use N poses; expected -a, -s or --align-mode as well");
   }
 }
 
@@ -177,7 +179,7 @@ void AddAlignment(CLI::App& command, EvalArguments& a) {
       "-a,--align", a.se3, "align by rotation and translation (se3); with -s also by scale (sim3)");
   CLI::Option* scale =
       command.add_flag("-s,--correct-scale", a.scale,
-                       "align by scale; with -a by rotation and translation too (sim3)");
+                       "align by scale; with -a, also by rotation and translation (sim3)");
   CLI::Option* origin =
       command.add_flag("--align-origin", a.origin, "align the first poses with each other");
   CLI::Option* mode =
@@ -219,7 +221,7 @@ void AddErrors(CLI::App& command, EvalArguments& a) {
   command.add_flag("--all-pairs", a.options.pairs.all, "RPE: use overlapping pairs");
   command
       .add_option("-t,--delta-tol", a.options.pairs.tolerance,
-                  "RPE: tolerance of delta for --all-pairs, relative; default 0.1")
+                  "RPE: relative tolerance of --delta for --all-pairs; default 0.1")
       ->option_text("X")
       ->check(IsNumber(0.0, 1.0));
 }
@@ -250,7 +252,7 @@ void AddOutputFormats(CLI::App& command, EvalArguments& a) {
   CLI::Option* latex = add("--latex", OutputFormat::kLatex, "print a LaTeX table");
   json->excludes(markdown)->excludes(latex);
   markdown->excludes(latex);
-  command.add_flag("--quiet")->description("print no warnings");
+  command.add_flag("--quiet")->description("do not print warnings");
 }
 
 }  // namespace
@@ -261,8 +263,8 @@ void AddEval(CLI::App& program, Action& action) {
   const auto arguments = std::make_shared<EvalArguments>();
   command
       .add_option("REF", arguments->reference,
-                  "the reference: a file or a run folder; if EST is missing, a run folder that is "
-                  "compared with its own truth")
+                  "the reference: a file or a run folder; without EST, the estimators of this run "
+                  "folder are compared with the truth of the run")
       ->option_text(" ")
       ->required()
       ->check(IsNonEmpty);

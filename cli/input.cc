@@ -44,7 +44,8 @@ std::string DefaultOutputName(const fs::path& config) {
 
 constexpr const char* kRuns = "runs";
 
-/// Returns true if `folder` is runs/ itself. It contains all runs, which --force would delete.
+/// Returns true if `folder` is runs/ itself, which contains all runs. --force would delete all of
+/// them.
 bool IsRunsFolder(const fs::path& folder) {
   std::error_code error;
   const fs::path runs = fs::absolute(kRuns, error) / "";
@@ -60,10 +61,10 @@ std::function<std::string(const std::string&)> IsInteger(std::int64_t minimum,
     const char* const end = text.data() + text.size();
     const auto [parsed_end, error] = std::from_chars(text.data(), end, value);
     const bool is_integer = error == std::errc() && parsed_end == end;
-    // CLI11 would later parse the text as C does, so 010 would be 8.
+    // CLI11 parses the text later with the rules of C, so 010 would mean 8.
     const std::size_t first = text.starts_with('-') ? 1 : 0;
     if (is_integer && text.size() > first + 1 && text[first] == '0')
-      return "'" + text + "' has a leading zero";
+      return "'" + text + "' has a leading zero; expected a number without leading zeros";
     if (is_integer && value >= minimum && value <= maximum) return {};
     return "'" + text + "' is not an integer from " + std::to_string(minimum) + " to " +
            std::to_string(maximum);
@@ -83,7 +84,7 @@ std::function<std::string(const std::string&)> IsNumber(double minimum, double m
   };
 }
 
-std::string IsNonEmpty(const std::string& path) { return path.empty() ? "empty path" : ""; }
+std::string IsNonEmpty(const std::string& path) { return path.empty() ? "the path is empty" : ""; }
 
 void AddSets(CLI::App& command, std::vector<std::string>& sets, const std::string& help) {
   command.add_option("--set", sets, help)
@@ -106,7 +107,7 @@ void AddOutput(CLI::App& command, std::string& folder, const std::string& help) 
 }
 
 CLI::Option* AddSeed(CLI::App& command, std::optional<std::uint64_t>& seed) {
-  return command.add_option("--seed", seed, "seed of the source; replaces that of the config")
+  return command.add_option("--seed", seed, "seed of the source; replaces the seed in the config")
       ->option_text("N")
       ->check(IsInteger(0, INT64_MAX));
 }
@@ -116,10 +117,10 @@ void Input::AddTo(CLI::App& command) {
       ->option_text(" ")
       ->required()
       ->check(IsNonEmpty);
-  AddSets(command, sets, "set a key of the config, in dotted form; may be repeated");
+  AddSets(command, sets, "set a key of the config, such as source.seed=7; may be repeated");
   AddPluginPath(command, plugin_paths);
   command.add_flag("--allow-outside", allow_outside,
-                   "allow the paths of `include:` and `output:` to leave their folders");
+                   "allow paths in `include:` and `output:` that lead out of their folders");
 }
 
 Config Input::Load() const {
@@ -193,8 +194,8 @@ void ProtectInputs(const std::string& output, const std::vector<std::string>& in
     if (!is_inside(path, destination) && !is_inside(path, partial)) continue;
     throw Error(ExitCode::kCannotCreate,
                 ErrorLine(Place{output}, {},
-                          std::string(path == destination ? "is" : "contains") + " the input '" +
-                              input + "'",
+                          std::string("the folder ") + (path == destination ? "is" : "contains") +
+                              " the input '" + input + "'",
                           "another folder"));
   }
 }
@@ -207,11 +208,11 @@ fs::path PreferredFolder(const std::string& requested, const Config& config, con
   if (!requested.empty()) {
     if (!IsRunsFolder(requested)) return requested;
     throw Error(ExitCode::kCannotCreate,
-                ErrorLine(Place{requested}, {}, kIsRunsFolder, "runs/NAME"));
+                ErrorLine(Place{requested}, {}, std::string("this ") + kIsRunsFolder, "runs/NAME"));
   }
   if (const auto output = config.root().Find("output")) {
     const std::string name = output->Text();
-    if (name.empty()) output->Fail("empty path", "a name inside runs/");
+    if (name.empty()) output->Fail("the path is empty", "a name inside runs/");
     FullPath(name);  // throws if the current folder no longer exists
     const fs::path folder =
         ResolveInside(kRuns, name, input.allow_outside, output->place(), output->path());
@@ -222,8 +223,8 @@ fs::path PreferredFolder(const std::string& requested, const Config& config, con
   return fs::path(kRuns) / (prefix + DefaultOutputName(input.config));
 }
 
-/// Returns `folder`, or the first of FOLDER-2, FOLDER-3, ... that neither exists nor is being
-/// written.
+/// Returns the first free folder of FOLDER, FOLDER-2, FOLDER-3, ... A folder is free if neither the
+/// folder nor its `.partial` folder exists.
 fs::path FreeFolder(const fs::path& folder) {
   const auto exists = [](const fs::path& path) {
     std::error_code error;

@@ -14,13 +14,13 @@ namespace {
 
 constexpr const char* kProgramFooter = R"(Examples:
   alidade doctor                                   check the installation
-  alidade plugins list                             sensors, motion models, sources, estimators
+  alidade plugins list                             list models, sources and estimators
   alidade check stereo_disparity --config examples/05_depth_principled/config.yaml
   alidade explain examples/05_depth_principled/config.yaml
   alidade run examples/05_depth_principled/config.yaml -o runs/first
   alidade replay runs/first                        repeat the run and compare every byte
   alidade sweep examples/05_depth_principled/config.yaml --runs 200
-  alidade eval runs/slam                           trajectories against truth: ATE, RPE, NEES
+  alidade eval runs/slam                           compare trajectories with truth: ATE, RPE
   alidade compare examples/08_depth_all_estimators/config.yaml
 
 `alidade COMMAND --help` describes a command. Exit codes: 0 ok, 1 problem found, 2 usage,
@@ -72,11 +72,12 @@ ArgumentList ReversedArguments(ArgumentList arguments) {
 constexpr const char* kLogLevels = "trace, debug, info, warning, error, off";
 
 std::string IsLogLevel(const std::string& text) {
-  return LogLevelOf(text) ? "" : "'" + text + "' is not a level; expected " + kLogLevels;
+  return LogLevelOf(text) ? "" : "'" + text + "' is not a log level; expected one of " + kLogLevels;
 }
 
-/// Returns the log level of the terminal: `log_level` if --log-level is present. Otherwise error if
-/// --quiet is present, else the level that ALIDADE_LOG names, else warning.
+/// Returns the log level of the terminal. --log-level, whose argument is `log_level`, has
+/// precedence over --quiet, which means `error`. --quiet has precedence over the variable
+/// ALIDADE_LOG. The default is `warning`.
 LogLevel LogLevelFor(const CLI::App& command, const std::string& log_level) {
   if (!log_level.empty()) return *LogLevelOf(log_level);
   const CLI::Option* quiet = command.get_option_no_throw("--quiet");
@@ -147,7 +148,7 @@ std::string Suggestion(const CLI::App& app, const std::string& word) {
 std::string UsageErrorText(const CLI::App& command, const CLI::ParseError& error) {
   const std::vector<std::string> extra = command.remaining();
   const bool needs_command = !command.get_subcommands({}).empty();
-  if (extra.empty()) return needs_command ? "missing command" : error.what();
+  if (extra.empty()) return needs_command ? "a command is missing" : error.what();
   const std::string& word = extra.front();
   const char* const problem = word.starts_with('-') ? "unknown option '"
                               : needs_command       ? "unknown command '"
@@ -217,8 +218,8 @@ ExitCode RunGuarded(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   // Ceres logs with glog, which reads this variable when the Ceres plugins load glog. The value 3
-  // means that only fatal errors are printed; the results contain the solver's reports. A value
-  // that the user has set does not change.
+  // means that only fatal errors are printed; the results contain the solver's reports. setenv does
+  // not replace a value that the user has set.
   setenv("GLOG_minloglevel", "3", 0);
   alidade::cli::PrepareConsole();
   return static_cast<int>(alidade::cli::RunGuarded(argc, argv));

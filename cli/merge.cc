@@ -16,8 +16,9 @@ constexpr const char* kMergeFooter = R"(Examples:
   alidade sweep config.yaml --runs 1000 --shard 2/2 -o runs/shard-2
   alidade merge runs/shard-1 runs/shard-2 -o runs/whole
 
-The folder equals, byte for byte, the folder of one sweep over all runs. Exit code 1: some runs
-failed; 65: a shard is missing, occurs twice, is not finished, or belongs to another sweep.)";
+The merged folder is equal, byte for byte, to the folder of one sweep over all runs. Exit code 1:
+some runs failed; 65: a shard is missing, occurs twice, is not finished, or belongs to another
+sweep.)";
 
 struct MergeArguments {
   std::vector<std::string> shards;

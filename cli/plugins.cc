@@ -17,8 +17,9 @@ constexpr const char* kPluginsFooter = R"(Examples:
   alidade plugins info ekf
   alidade plugins where --plugin-path build/lib
 
-Plugins are searched for in the config's `plugins:`, --plugin-path, ALIDADE_PLUGIN_PATH, the user's
-data folder ($XDG_DATA_HOME/alidade/plugins) and next to the program.)";
+alidade searches for plugins in the paths of the config's `plugins:`, of --plugin-path and of
+ALIDADE_PLUGIN_PATH, in the user's data folder ($XDG_DATA_HOME/alidade/plugins), and next to the
+program.)";
 
 struct PluginsArguments {
   std::vector<std::string> paths;
@@ -28,7 +29,7 @@ struct PluginsArguments {
 
 using Listing = std::string (*)(const PluginHost&, const PluginsArguments&);
 
-/// Adds the options of a subcommand that prints the text that `listing` returns.
+/// Adds the options of a subcommand. The subcommand prints the result of `listing`.
 std::shared_ptr<PluginsArguments> AddListing(CLI::App& command, Action& action, Listing listing,
                                              OnRefusal on_refusal = OnRefusal::kThrow) {
   const auto arguments = std::make_shared<PluginsArguments>();
@@ -46,8 +47,8 @@ std::shared_ptr<PluginsArguments> AddListing(CLI::App& command, Action& action, 
 
 std::string List(const PluginHost& host, const PluginsArguments& arguments) {
   if (const std::size_t count = host.refusals().size(); count > 0) {
-    PrintNote(std::to_string(count) +
-              " plugins refused: `alidade plugins where` lists the reasons");
+    PrintNote(std::to_string(count) + (count == 1 ? " plugin was" : " plugins were") +
+              " refused: `alidade plugins where` lists the reasons");
   }
   return arguments.json ? PluginListJson(host) : PluginList(host, arguments.files);
 }

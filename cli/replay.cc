@@ -22,9 +22,9 @@ constexpr const char* kReplayFooter = R"(Examples:
   alidade replay runs/first
   alidade replay runs/first -o runs/again          keep the repeated run
 
-DIR is a folder of `alidade run` or `alidade sweep`. Its inputs.json and config.resolved.yaml record
-the inputs. All files are compared, except files with wall-clock times such as timing.json. Exit
-code 1: a file differs.)";
+DIR is a folder that `alidade run` or `alidade sweep` wrote. The files inputs.json and
+config.resolved.yaml in this folder record the inputs. All files are compared, except files with
+wall-clock times such as timing.json. Exit code 1: a file differs.)";
 
 struct ReplayArguments {
   std::string folder, output;
@@ -38,8 +38,9 @@ class ScratchFolder {
     std::error_code error;
     const fs::path temporary = fs::temp_directory_path(error);
     if (error) {
-      throw Error(ExitCode::kCannotCreate,
-                  "TMPDIR: not a folder for temporary files; expected an existing folder");
+      throw Error(
+          ExitCode::kCannotCreate,
+          "TMPDIR: the folder for temporary files does not exist; expected an existing folder");
     }
     std::string name = (temporary / "alidade-replay-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) internal::FailCreate(name, errno);
@@ -72,7 +73,7 @@ ExitCode RepeatCommand(const internal::RecordedInputs& recorded, const fs::path&
   if (error) {
     throw Error(ExitCode::kInputMissing,
                 ErrorLine(Place{(folder / internal::kResolvedConfig).string()}, {},
-                          "cannot be copied: " + error.message()));
+                          "the file cannot be copied: " + error.message()));
   }
   std::vector<std::string> arguments = recorded.command.arguments;
   arguments.insert(arguments.end(), {config.string(), "-o", output.string(), "--quiet"});
@@ -116,7 +117,7 @@ void AddReplay(CLI::App& program, Action& action,
   CLI::App& command = *program.add_subcommand(
       "replay", "Repeat a run or a sweep, compare every byte, and list the files that differ");
   const auto arguments = std::make_shared<ReplayArguments>();
-  command.add_option("DIR", arguments->folder, "the folder of a run or sweep")
+  command.add_option("DIR", arguments->folder, "folder of a run or sweep")
       ->option_text(" ")
       ->required()
       ->check(IsNonEmpty);

@@ -22,11 +22,11 @@ namespace alidade::cli {
 namespace {
 
 constexpr const char* kRunFooter = R"(Examples:
-  alidade run base.yaml                            into runs/base, then runs/base-2
-  alidade run near/config.yaml                     into runs/near
+  alidade run base.yaml                            write runs/base; a second run writes runs/base-2
+  alidade run near/config.yaml                     write runs/near
   alidade run config.yaml -o runs/b --seed 2 --set estimators.ekf.gate=0.99
   alidade run config.yaml --set source.path=other.csv --force
-  alidade run images.yaml --save-video run.avi     annotated video: features, gates, estimate
+  alidade run images.yaml --save-video run.avi     draw features, gates and the estimate
   tail -f log.csv | alidade run live.yaml --set source.path=/dev/stdin --follow | my_robot
 
 The folder is called DIR.partial until the run ends. Ctrl-C finishes the frame, writes the results
@@ -68,7 +68,7 @@ std::string EventLine(const Event& event) {
   return line.str() + event.text;
 }
 
-/// Returns a summary of the estimators' events: a few lines for each kind.
+/// Returns a summary of the estimators' events, with a few lines for each kind of event.
 std::string EventSummary(const RunResult& result) {
   constexpr std::size_t kShown = 3;
   std::string text;
@@ -140,7 +140,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
   const Output output = OutputFolder(arguments.folder, config, arguments.input, arguments.force);
   const PluginHost host = arguments.input.HostFor(config);
-  StopOnSignals();  // before BuildExperiment, because that may wait for a pipe
+  StopOnSignals();  // BuildExperiment may wait for a pipe, which a signal must interrupt
   Experiment experiment = BuildExperiment(config, host);
   const std::unique_ptr<RunViewer> viewer = ViewerOf(arguments, experiment, config);
   Recorder recorder(RecordOf(arguments, config, output.folder, host), config);
@@ -177,13 +177,13 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   arguments->command = command_line;
   arguments->input.AddTo(command);
   AddOutput(command, arguments->folder,
-            "run folder; default: the config's `output:`, or its name, in runs/");
+            "run folder; default: the config's `output:`, or the name of the config, in runs/");
   AddSeed(command, arguments->seed);
   command.add_flag("--force", arguments->force, "replace the run folder if it exists");
   command.add_flag("--all", arguments->all, "print all rows of the table, not only ten");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--follow", arguments->follow,
-                   "print each estimate at once as a line of JSON, instead of the table");
+                   "print each estimate at once as a line of JSON; do not print the table");
   command
       .add_option("--save-video", arguments->video,
                   "save an annotated video (features, gates, estimate); needs OpenCV")

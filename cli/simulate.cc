@@ -16,13 +16,13 @@ constexpr const char* kSimulateFooter = R"(Examples:
   alidade simulate config.yaml -o data/scene
   alidade simulate config.yaml -o data/scene-7 --seed 7
   alidade simulate config.yaml -o data/scene --video video.avi --images images
-  alidade run other.yaml --set source.path=data/scene   with source.type: tracks
+  alidade run other.yaml --set source.path=data/scene   if source.type is tracks
 
-No estimator runs. Landmark measurements are written to STREAM.csv as frame,feature,dim,value, other
-measurements as frame,t_s and their values. The folder also contains timestamps.csv, truth, map.csv
-and calibration.yaml. Images show the source's textured surfaces; the images of a stereo pair are in
-DIR/left and DIR/right. Without surfaces, images show an equal disc at the pixel of each landmark's
-measurement.)";
+No estimator runs. STREAM.csv contains the measurements of a stream. Its columns are
+frame,feature,dim,value for landmarks, and frame,t_s and the values for other measurements. The
+folder also contains timestamps.csv, truth, map.csv and calibration.yaml. Images show the textured
+surfaces of the source. Without surfaces, images show an equal disc at each measured pixel. The
+images of a stereo pair are in DIR/left and DIR/right.)";
 
 struct SimulateArguments {
   Input input;
@@ -35,7 +35,7 @@ struct SimulateArguments {
 std::string IsInside(const std::string& name) {
   const std::filesystem::path path = std::filesystem::path(name).lexically_normal();
   if (!path.empty() && path != "." && path != "./") return {};
-  return "'" + name + "' is the folder itself; expected a name inside it, such as images";
+  return "'" + name + "' is the output folder; expected a name inside this folder, such as images";
 }
 
 ExitCode RunSimulate(const SimulateArguments& arguments) {
@@ -55,7 +55,8 @@ ExitCode RunSimulate(const SimulateArguments& arguments) {
     Print(text);
   }
   if (!result.stopped) return ExitCode::kOk;
-  PrintNote("stopped after " + std::to_string(result.frames) + " frames");
+  PrintNote("stopped after " + std::to_string(result.frames) +
+            (result.frames == 1 ? " frame" : " frames"));
   return ExitCode::kStopped;
 }
 
@@ -67,16 +68,16 @@ void AddSimulate(CLI::App& program, Action& action) {
   const auto arguments = std::make_shared<SimulateArguments>();
   arguments->input.AddTo(command);
   AddOutput(command, arguments->folder,
-            "folder; default: the config's `output:`, or data-NAME, in runs/");
+            "output folder; default: the config's `output:`, or data-NAME, in runs/");
   AddSeed(command, arguments->seed);
   command
       .add_option("--video", arguments->images.video,
-                  "write the camera's images as a video, FILE.avi in the folder; needs OpenCV")
+                  "write the images as a video, FILE.avi in the output folder; needs OpenCV")
       ->option_text("FILE")
       ->check(IsAvi);
   command
       .add_option("--images", arguments->images.folder,
-                  "write one PNG for each frame, to DIR in the folder; needs OpenCV")
+                  "write one PNG file per frame to DIR in the output folder; needs OpenCV")
       ->option_text("DIR")
       ->check(IsNonEmpty)
       ->check(IsInside);

@@ -18,16 +18,17 @@ namespace alidade::cli {
 namespace {
 
 constexpr const char* kSweepFooter = R"(Examples:
-  alidade sweep config.yaml --runs 200             seeds 1 to 200, all processors
+  alidade sweep config.yaml --runs 200             use seeds 1 to 200 and all processors
   alidade sweep config.yaml --runs 200 --first-seed 1001 -o runs/test
   alidade sweep config.yaml --runs 10000 --shard 3/16 -o runs/shard-03
   alidade sweep config.yaml --runs 200 --vary sensors.stereo.sigma_px=0.5,1,2
   alidade sweep config.yaml --runs 200 -o runs/test --resume
 
-The folder contains sweep.json, runs.csv and table.md; with --vary also sweep.csv and a figure. The
-number of jobs does not change a byte of them. Exit code 1: some runs failed; 75: stopped by a
-signal. Until all runs are finished the folder is called FOLDER.partial. A sweep that was stopped or
-killed leaves this folder, and --resume adds the missing runs. `alidade merge` merges shards.)";
+The folder contains sweep.json, runs.csv and table.md. With --vary, it also contains sweep.csv and a
+figure. The number of jobs does not change the contents. Exit code 1: some runs failed; 75: a signal
+stopped the sweep. Until all runs are finished, the folder is called FOLDER.partial. A sweep that
+was stopped or killed leaves this folder, and --resume adds the missing runs. `alidade merge` merges
+the folders of shards.)";
 
 struct SweepArguments {
   Input input;
@@ -58,7 +59,7 @@ void CheckShards(const SweepOptions& options) {
   if (!options.shard || options.shard->count <= options.runs) return;
   throw CLI::ValidationError("--shard", std::to_string(options.shard->count) + " shards of " +
                                             std::to_string(options.runs) +
-                                            " runs; expected a run for each shard");
+                                            " runs; expected at least one run for each shard");
 }
 
 /// Inputs that both kinds of sweep need.
@@ -81,7 +82,7 @@ std::unique_ptr<SweepFolder> OpenFolder(const Task& task, SweepOptions& options)
   options.finished = folder->finished();
   if (const std::size_t count = options.finished->size(); count > 0 && !arguments.quiet) {
     PrintNote("resuming " + folder->files().partial().string() + ": " + std::to_string(count) +
-              " runs are finished");
+              (count == 1 ? " run is finished" : " runs are finished"));
   }
   return folder;
 }
@@ -102,7 +103,7 @@ ExitCode SweepValues(const Task& task, SweepOptions options) {
 }
 
 /// For --resume: returns true if `folder` is a finished sweep of this config and these inputs.
-/// Error: kCannotCreate if the folder was made from other inputs.
+/// Error: kCannotCreate if the folder was made from different inputs.
 bool IsFinished(const std::filesystem::path& folder, const Config& config,
                 const std::string& inputs) {
   if (!std::filesystem::exists(folder / internal::kInputsFile)) return false;
@@ -111,12 +112,13 @@ bool IsFinished(const std::filesystem::path& folder, const Config& config,
       {config.ToYaml(), inputs});
   if (difference.empty()) return true;
   throw Error(ExitCode::kCannotCreate,
-              ErrorLine(Place{folder.string()}, {}, "was made from other inputs: " + difference) +
-                  "; to replace it, leave out --resume and add --force");
+              ErrorLine(Place{folder.string()}, {},
+                        "the folder was made from other inputs: " + difference) +
+                  "; to replace the folder, use --force instead of --resume");
 }
 
 /// Returns the config of the runs, or one config for each varied value. Omits values that cannot be
-/// set; the sweep reports those.
+/// set, because the sweep reports these values.
 std::vector<Config> ConfigsOf(const SweepArguments& arguments, const Config& config) {
   if (arguments.vary.empty()) return {config};
   const Variation variation = Variation::FromText(arguments.vary);
@@ -157,14 +159,14 @@ ExitCode RunSweep(const SweepArguments& arguments) {
       arguments.input.InputsText(config, ArgumentsOf(arguments), configs,
                                  internal::HashFiles(internal::FindUsedPlugins(configs, host)));
   if (arguments.resume && IsFinished(path, config, inputs)) {
-    if (!arguments.quiet) PrintNote(path.string() + " is finished: nothing to resume");
+    if (!arguments.quiet) PrintNote(path.string() + " is already finished");
     return std::filesystem::exists(path / "failures.csv") ? ExitCode::kFound : ExitCode::kOk;
   }
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.options;
   bool is_reported = arguments.quiet;
   options.progress = [&](std::int64_t done, std::int64_t total) {
-    // Not earlier, because only now the config is known to be valid.
+    // Progress implies that the config is valid, so the output folder can be reported now.
     if (!std::exchange(is_reported, true)) ReportOutput(output);
     progress.Show(done, total);
   };
@@ -179,7 +181,7 @@ void AddSweep(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand("sweep", "Run a config with many seeds");
   const auto arguments = std::make_shared<SweepArguments>();
   arguments->input.AddTo(command);
-  command.add_option("--runs", arguments->options.runs, "total number of runs of all shards")
+  command.add_option("--runs", arguments->options.runs, "total number of runs, over all shards")
       ->option_text("N")
       ->required()
       ->check(IsInteger(1, 1'000'000));
@@ -202,15 +204,15 @@ void AddSweep(CLI::App& program, Action& action) {
       ->option_text("i/n");
   command
       .add_option("--vary", arguments->vary,
-                  "run all seeds with each of these values of a key, or of KEY+KEY, and compare")
+                  "run all seeds with each value of a key, or of several keys KEY+KEY")
       ->option_text("KEY=v1,v2,...")
       ->check(IsNonEmpty);
   AddOutput(command, arguments->folder,
-            "folder; default: the config's `output:`, or sweep-NAME, in runs/");
+            "output folder; default: the config's `output:`, or sweep-NAME, in runs/");
   command.add_flag("--force", arguments->force, "replace the folder if it exists");
   command
       .add_flag("--resume", arguments->resume,
-                "continue a sweep that was stopped, in FOLDER.partial: add the missing runs")
+                "add the missing runs to FOLDER.partial, the folder of a stopped sweep")
       ->needs(command.get_option("--output"))
       ->excludes(command.get_option("--force"));
   command.add_flag("--quiet", arguments->quiet, "print errors only");

@@ -8,10 +8,10 @@
 namespace alidade::cli {
 namespace {
 
-constexpr const char* kResume = "; --resume continues it";
+constexpr const char* kResume = "; --resume continues the sweep";
 
-/// Prints the reasons of the first few failed runs, each after `prefix`, and the number of failed
-/// runs if there are more. Returns true if a run failed.
+/// Prints the reasons why the first few runs failed. If more runs failed, also prints the number of
+/// failed runs. Each line begins with `prefix`. Returns true if a run failed.
 bool ReportFailures(const SweepResult& result, const std::string& prefix) {
   constexpr int kShown = 5;
   int failed = 0;
@@ -74,7 +74,7 @@ ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
     if (std::filesystem::exists(written / reprojection)) names.insert(names.begin(), reprojection);
     PrintWritten(written, SweepTable(sweep), names);
   }
-  if (!note.empty()) Log(LogLevel::kWarning, "no figure drawn: " + note);
+  if (!note.empty()) Log(LogLevel::kWarning, "no figure was drawn: " + note);
   return CodeOf(sweep.stopped(), failed);
 }
 

@@ -9,12 +9,12 @@
 #include "alidade/config/config.h"
 #include "alidade/sweep/sweep.h"
 
-/// Last steps of the commands that write the folder of a sweep.
+/// Last steps of `alidade sweep` and `alidade merge`, which write the folder of a sweep.
 namespace alidade::cli {
 
-/// Writes a sweep into its folder. The final path of the folder is `path`. Prints the reasons of
-/// failed runs and, unless `quiet` is true, the tables and the folder. Returns the exit code.
-/// Errors: those of SweepFolder::Write.
+/// Writes a sweep into its folder. The final path of the folder is `path`. Prints the reasons why
+/// runs failed. Unless `quiet` is true, also prints the tables and the path of the folder. Returns
+/// the exit code. Errors: those of SweepFolder::Write.
 ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
                      const SweepResult& result, const Config& config, bool quiet);
 ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,

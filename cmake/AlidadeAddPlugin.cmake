@@ -4,9 +4,9 @@
 #
 # Builds a plugin that alidade loads at run time. Symbols have hidden visibility, and no
 # instruction-set flags are set. A C-ABI plugin, which provides models, needs only the headers. With
-# CPP, builds a C++ plugin, which provides sources or estimators. It links alidade::core, and only
-# an alidade with the same ABI number loads it. alidade searches only the FOLDER `plugins`, and
-# loads plugins in other folders on demand.
+# CPP, builds a C++ plugin, which provides sources or estimators. The C++ plugin links
+# alidade::core, and only an alidade with the same ABI number loads it. alidade searches only the
+# folder `plugins`, which is the default of FOLDER. It loads plugins of other folders on demand.
 #
 # A plugin without optimisation is many times slower. If neither CMAKE_BUILD_TYPE nor
 # CMAKE_CXX_FLAGS sets an optimisation level, the plugin is compiled with -O2.

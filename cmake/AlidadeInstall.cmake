@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
-# Installs everything that AlidadeInstallEstimation does not: the program, the libraries core and
-# tools, and the plugins. Uses the variables package_folder and plugin_folder of that file.
+# Installs everything that AlidadeInstallEstimation does not install: the program, the libraries
+# core and tools, and the plugins. Uses the variables package_folder and plugin_folder of that file.
 
-# Sets the variable `result` to the plugin targets that `folder` and its subfolders define.
+# Sets the variable with the name `result` to the plugin targets that `folder` and its subfolders
+# define.
 function(alidade_plugins_of folder result)
   get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
   set(plugins)
@@ -28,8 +29,8 @@ install(TARGETS alidade_core alidade_tools EXPORT alidadeTargets FILE_SET HEADER
 
 foreach(folder IN ITEMS motion_models sensors plugins)
   alidade_plugins_of(${PROJECT_SOURCE_DIR}/${folder} plugins)
-  # C++ plugins link the library. Because the path is relative, the library and the plugins can be
-  # moved together.
+  # C++ plugins link the library. The path to the library is relative, so the library and the
+  # plugins can be moved together.
   set_target_properties(${plugins} PROPERTIES INSTALL_RPATH "$ORIGIN/../..")
   foreach(plugin IN LISTS plugins)
     get_target_property(subfolder ${plugin} ALIDADE_FOLDER)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 
-# Installs the components `estimation` and `testing`, for programs that define a filter in C++. They
-# contain the library, the headers of the shipped models, and the package that find_package(alidade)
-# reads.
+# Installs the components `estimation` and `testing`, for programs that define a filter in C++. The
+# components contain the library, the headers of the shipped models, and the package that
+# find_package(alidade) reads.
 include(CMakePackageConfigHelpers)
 
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/alidade)

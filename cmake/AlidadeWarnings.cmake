@@ -2,10 +2,10 @@
 
 # alidade_warnings(TARGET)
 #
-# Sets the warning options of all targets of this project. GCC 12 prints two false warnings. One is
-# about overlaps in `"text" + std::string` (-Wrestrict, GCC bug 105651). The other occurs with
-# sanitizers and is about uninitialised members of std::regex (-Wmaybe-uninitialized; see -fsanitize
-# in the manual of GCC).
+# Sets the warning options of all targets of this project. GCC 12 prints two false warnings. The
+# first concerns overlaps in `"text" + std::string` (-Wrestrict, GCC bug 105651). The second
+# concerns uninitialised members of std::regex, and occurs only with sanitizers
+# (-Wmaybe-uninitialized; see -fsanitize in the manual of GCC).
 function(alidade_warnings target)
   set(old_gcc $<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>)
   target_compile_options(${target} PRIVATE

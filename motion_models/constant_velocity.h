@@ -9,17 +9,17 @@ namespace alidade {
 ///
 ///   model      p' = p + v dt + g_p(w),  v' = v + g_v(w)
 ///   noise      continuous (CWNA): a white acceleration of spectral density sigma^2. For each axis,
-///              Cov(g_p, g_v) = sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt]. (g_p, g_v) is its Cholesky
-///              factor times w ~ N(0, I). The division of dt into steps does not change Q
-///   noise      discrete (DWNA): w = a ~ N(0, sigma^2 I), constant between two updates:
-///              g_p = a dt^2/2, g_v = a dt: rank 1 for each axis. n intervals in a second add
+///              C = Cov(g_p, g_v) = sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt]. (g_p, g_v) is the Cholesky
+///              factor of C times w ~ N(0, I). The division of dt into steps does not change Q
+///   noise      discrete (DWNA): w = a ~ N(0, sigma^2 I), constant between two updates.
+///              g_p = a dt^2/2, g_v = a dt; Q has rank 1 for each axis. n intervals in a second add
 ///              sigma^2 / n to Var(v), so Var(v) depends on the rate of the measurements
 ///   Jacobian   F = [I  dt I; 0  I]                     2D x 2D
 ///
 ///   symbol     shape  unit                     frame  meaning
 ///   p, v       D      m, m/s                   any    position, velocity
-///   sigma      1      m/s^1.5 (continuous)     any    root of the spectral density of the
-///                     m/s^2 (discrete)                acceleration; or standard deviation
+///   sigma      1      m/s^1.5 (continuous)     any    root of the spectral density
+///                     m/s^2 (discrete)                or standard deviation of the acceleration
 ///   D          -      -                        -      1 to 3
 ///
 /// Defined everywhere. docs/noise_models.md compares both kinds of noise and converts sigma.

@@ -28,7 +28,7 @@ namespace alidade {
 ///                       rad/s              v is the velocity of the vehicle's origin
 ///   sigma_v      3      m/s^0.5   vehicle  noise of v, for each axis; >= 0. Continuous: root of
 ///                                          the spectral density; discrete: standard deviation, m/s
-///   sigma_omega  3      rad/s^0.5 vehicle  noise of omega, like sigma_v; discrete: rad/s
+///   sigma_omega  3      rad/s^0.5 vehicle  noise of omega, defined like sigma_v; discrete: rad/s
 ///   t_0, R_0     3, -   m, -      vehicle  vehicle_from_cam: position and orientation of the
 ///                                          camera
 ///   dt_m, R_m    3, 4   m, -      vehicle  extrinsics, relative to t_0 and R_0
@@ -57,7 +57,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
       "vx,vy,vz,wx,wy,wz"};
 
   NoiseKind kind;
-  std::array<double, 3> sigma_v, sigma_omega, mount;  ///< mount: t_0
+  std::array<double, 3> sigma_v, sigma_omega, mount;  ///< `mount` is t_0
   std::array<double, 4> vehicle_from_cam;             ///< R_0
 
   OdometryPose(NoiseKind noise, const std::array<double, 3>& linear,
@@ -118,7 +118,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     speed_scale_error1[0] = speed_scale_error[0];
   }
   void SqrtQ(double dt_s, MatrixRef Lq) const {
-    double scale = 1.0;  // factor for the mean velocities of the step
+    double scale = 1.0;  // converts sigma to the standard deviation of the mean velocities
     if (kind == NoiseKind::kContinuous) scale = dt_s > 0.0 ? 1.0 / std::sqrt(dt_s) : 0.0;
     for (std::size_t i = 0; i < 3; ++i) {
       const int k = static_cast<int>(i);

@@ -24,8 +24,8 @@ namespace alidade {
 ///   sigma_alpha     3      rad/s^2        body   standard deviation of alpha, for each axis; >= 0
 ///
 /// Defined everywhere. Steps without noise are additive in dt. For a camera, the frame `body` is
-/// `cam`. Because r' depends on v', the noise of r over an interval depends on its division into
-/// steps, but not to first order in dt.
+/// `cam`. Because r' depends on v', the noise of r over an interval depends on the division of the
+/// interval into steps, but not to first order in dt.
 /// Source       [MonoSlam2015] sec. 4.3, [Davison2007] sec. 3.4.
 struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   static constexpr std::array kBlocks{
@@ -68,14 +68,14 @@ struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   }
 };
 
-/// Rigid body as in QuaternionPose, but with white accelerations (continuous noise, CWNA). The
-/// steps into which dt is divided do not change Q.
+/// Rigid body like QuaternionPose, but with white accelerations (continuous noise, CWNA). The
+/// division of dt into steps does not change Q.
 ///
 ///   model      r' = r + v dt + w_r,     q' = q Exp(omega dt + w_q)
 ///              v' = v + w_v,            omega' = omega + w_omega
 ///   noise      w ~ N(0, Lq Lq'). For each axis,
-///              Cov(w_r, w_v) = sigma_a^2 [dt^3/3 dt^2/2; dt^2/2 dt], and the same for
-///              (w_q, w_omega) with sigma_alpha: exact for omega = 0, else to first order
+///              Cov(w_r, w_v) = sigma_a^2 [dt^3/3 dt^2/2; dt^2/2 dt]. Cov(w_q, w_omega) has this
+///              form with sigma_alpha, which is exact for omega = 0, else correct to first order
 ///   Jacobian   F = [I 0 dt I 0; 0 R(Exp(-phi)) 0 dt J(phi); 0 0 I 0; 0 0 0 I],
 ///              phi = omega dt + w_q
 ///              G = diag(I, J(phi), I, I),  J(phi) = d Log(Exp(-phi) Exp(phi + d))/dd

@@ -4,7 +4,8 @@
 # Functions and settings that all scripts use. A script sources this file in the root folder of the
 # repository, under `set -o pipefail`.
 
-# Number of parallel compilers: at most one per processor and one per 2 GiB of memory.
+# Number of parallel compilers: at most one for each processor, and at most one for each 2 GiB of
+# memory.
 jobs=$(nproc)
 memory_jobs=$(awk '/^MemAvailable:/ { print int($2 / 2097152) }' /proc/meminfo)
 ((memory_jobs < jobs)) && jobs=$((memory_jobs > 1 ? memory_jobs : 1))
@@ -15,8 +16,8 @@ if command -v ccache >/dev/null; then
   export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
 fi
 
-# Shows the progress `[done/all]` that its input reports. On a terminal the text stays in one place;
-# otherwise each tenth of the work prints one line.
+# Shows the progress `[done/all]` that its input reports. On a terminal, each report replaces the
+# previous one. Otherwise, one line is printed after each tenth of the work.
 progress() {
   local line tenth=0
   while IFS= read -r line; do
@@ -38,7 +39,7 @@ quietly() {
   if ! "$@" 2>&1 | tee "$log" | progress; then
     cat "$log" >&2
     rm -f "$log"
-    echo "error: failed: $*" >&2
+    echo "error: this command failed: $*" >&2
     return 1
   fi
   rm -f "$log"

@@ -14,5 +14,5 @@ void Make(alidade::Params& p, AlidadeInstance* instance) {
 }  // namespace
 
 ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "depth_feature",
-                                 "pixel and depth at which a depth camera sees a landmark",
+                                 "pixel and depth at which a depth camera observes a landmark",
                                  "[MonoSlam2015] sec. 2.1"))

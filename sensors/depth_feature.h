@@ -6,24 +6,24 @@
 
 namespace alidade {
 
-/// Pixel and depth at which a depth camera sees a landmark.
+/// Pixel and depth at which a depth camera observes a landmark.
 ///
 ///   model      (u, v) = K(h) + n_px,  d = hz / rho + n_d,     h = R_CW (rho (a - r) + m)
 ///   Jacobian   automatic differentiation               3 x (6 + landmark)
-///   noise      R = diag(sigma_u^2, sigma_v^2, (s0 + s2 d^2)^2)  3x3, px^2 and m^2, d predicted
+///   noise      R = diag(sigma_u^2, sigma_v^2, (s0 + s2 d^2)^2)  3x3, px^2 and m^2, predicted d
 ///   inverse    the point at the depth d on the ray of the pixel
 ///
 ///   symbol     shape  unit    frame  meaning
 ///   u, v       2      px      -      the pixel
 ///   d          1      m       cam    depth along the optical axis
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
-///   a, m, rho  -      -       world  the landmark p = a + m / rho; its representation defines them
+///   a, m, rho  -      -       world  landmark p = a + m / rho in the chosen representation
 ///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
 ///   sigma      2      px      -      standard deviations of u and v; > 0
-///   s0, s2     1      m, 1/m  -      standard deviation of d: constant part, > 0, and coefficient
-///                                    of d^2, >= 0 (for a depth from disparity)
+///   s0, s2     1      m, 1/m  -      constant part, > 0, and coefficient of d^2, >= 0, of the
+///                                    standard deviation of d. s2 models a depth from disparity
 ///
-/// Defined for  h within the lens, hz > 0 and rho > 0. Otherwise out_of_domain; outputs unchanged.
+/// Defined for  h in the domain of K, hz > 0, rho > 0. Otherwise out_of_domain; outputs unchanged.
 /// Valid for    pixels inside the image and d > 0. Other measurements are invalid.
 /// Source       [MonoSlam2015] sec. 2.1; noise [Khoshelham2012].
 template <class Representation>

@@ -14,5 +14,5 @@ void Make(alidade::Params& p, AlidadeInstance* instance) {
 }  // namespace
 
 ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "inverse_depth_feature",
-                                 "pixel at which one camera sees a landmark",
+                                 "pixel at which one camera observes a landmark",
                                  "[MonoSlam2015] sec. 4.3, [Civera2008]"))

@@ -6,7 +6,7 @@
 
 namespace alidade {
 
-/// Pixel at which one camera sees a landmark.
+/// Pixel at which one camera observes a landmark.
 ///
 ///   model      (u, v) = K(h) + n,   n ~ N(0, R),   h = R_CW (rho (a - r) + m)
 ///   Jacobian   automatic differentiation               2 x (6 + landmark), px/m, px/rad, px m
@@ -16,13 +16,13 @@ namespace alidade {
 ///   symbol     shape  unit    frame  meaning
 ///   u, v       2      px      -      the pixel
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
-///   a, m, rho  -      -       world  the landmark p = a + m / rho; its representation defines them
+///   a, m, rho  -      -       world  landmark p = a + m / rho in the chosen representation
 ///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
 ///   sigma      2      px      -      standard deviations of u and v; > 0
 ///   rho0       1      1/m     -      prior inverse distance from the camera; > 0 for xyz landmarks
 ///
-/// Defined for  h in front of the camera and within the lens. Otherwise out_of_domain; outputs
-///              unchanged. rho <= 0 is allowed, because only the direction of the ray matters.
+/// Defined for  h in the domain of K. Otherwise out_of_domain; outputs unchanged. rho <= 0 is
+///              allowed, because only the direction of h matters.
 /// Valid for    pixels inside the image. Other measurements are invalid.
 /// Source       [MonoSlam2015] sec. 4.3, [Civera2008] sec. II.
 template <class Representation>

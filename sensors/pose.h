@@ -18,7 +18,7 @@ namespace alidade {
 ///   q          4      -       world  orientation, world_from_body
 ///   n_r        3      m       world  noise of the position
 ///   n_q        3      rad     body   noise of the orientation, q (+) n = q Exp(n)
-///   sigma_r, sigma_q  3  m, rad  as n_r, n_q          standard deviation for each axis; > 0
+///   sigma_r, sigma_q  3  m, rad  world, body          standard deviation for each axis; > 0
 ///
 /// Defined everywhere.
 /// Source       q (+) n and its Jacobian [Sola2017] ch. 4.

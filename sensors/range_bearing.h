@@ -17,7 +17,7 @@ namespace alidade {
 ///   b          3      -       sensor bearing, a unit vector
 ///   n_b        2      rad     -      noise in the tangent plane of b
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_sensor) of the sensor
-///   a, m, rho  -      -       world  the landmark p = a + m / rho; its representation defines them
+///   a, m, rho  -      -       world  landmark p = a + m / rho in the chosen representation
 ///   sigma_d, sigma_b  1  m, rad  -   standard deviations; > 0
 ///   d_max      1      m       -      max_range_m: the largest valid range; > 0
 ///

@@ -6,9 +6,9 @@
 namespace alidade {
 
 /// Pose of a landmark relative to the body. The landmark is a fiducial tag, an object, a station or
-/// a keyframe. A keyframe is the pose of the body at an earlier time; odometry and loop closures
-/// are measured relative to it. To create a keyframe, measure a new landmark at the neutral pose
-/// without noise. The pose of the landmark is then a clone of the body's pose, with all
+/// a keyframe. A keyframe is the pose of the body at an earlier time. Odometry and loop closures
+/// are measured relative to a keyframe. To create a keyframe, measure a new landmark at the neutral
+/// pose without noise. The pose of the landmark is then a clone of the body's pose, with all
 /// correlations.
 ///
 ///   model      z = (R_BW (p - r) + n_r, (q^-1 s) (+) n_q),   (n_r, n_q) ~ N(0, R)
@@ -25,7 +25,7 @@ namespace alidade {
 ///   z_q        4      -       body      orientation of the landmark, body_from_landmark
 ///   n_r        3      m       body      noise of z_r
 ///   n_q        3      rad     landmark  noise of z_q, q (+) n = q Exp(n)
-///   sigma_r, sigma_q  3  m, rad  as n_r, n_q             standard deviation for each axis; > 0
+///   sigma_r, sigma_q  3  m, rad  body, landmark          standard deviation for each axis; > 0
 ///
 /// Defined everywhere.
 /// Source       clones [Roumeliotis2002]; q (+) n [Sola2017] ch. 4.

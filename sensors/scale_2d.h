@@ -9,7 +9,7 @@ namespace alidade {
 ///
 ///   model      s = lambda Z + n,   n ~ N(0, sigma_s^2),   lambda = 1 / Z0,  s = 1 / scale
 ///   Jacobian   ds/dZ = lambda, ds/dlambda = Z          1x1, 1/m and m
-///   noise      propagated: sigma_s = (2 sigma / w) (lambda Z)^3      from edge noise, see below
+///   noise      propagated: sigma_s = (2 sigma / w) (lambda Z)^3      derived below
 ///              constant:   sigma_s = sigma_inverse_scale
 ///   inverse    lambda = s / Z
 ///
@@ -19,8 +19,8 @@ namespace alidade {
 ///   lambda     1      1/m     -      inverse depth at which the template was recorded
 ///   w, sigma   1      px      -      template width, standard deviation of an edge; > 0
 ///
-/// A target of width w' = w / s has the scale w'/w. In the source, the scale has the standard
-/// deviation 2 sigma / w', because the errors of the two edges are added linearly, not in
+/// A target of apparent width w' = w / s has the scale w'/w. [Ekf2017] sets the standard deviation
+/// of the scale to 2 sigma / w', because it adds the errors of the two edges linearly, not in
 /// quadrature. The standard deviation of s = 1 / scale is then s^2 2 sigma / w'.
 ///
 /// Defined for  Z > 0 and lambda > 0. Otherwise out_of_domain; outputs unchanged.
@@ -33,8 +33,8 @@ struct Scale2d : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr Quantity kMeasurement{"inverse_scale", "", "template size / apparent size"};
   static constexpr int kInitialises = 1;
 
-  double constant_sigma = 0.0;  ///< sigma_inverse_scale of constant noise; 0: propagated noise
-  double relative_sigma = 0.0;  ///< 2 sigma / w of propagated noise
+  double constant_sigma = 0.0;  ///< sigma_inverse_scale if the noise is constant; else 0
+  double relative_sigma = 0.0;  ///< 2 sigma / w if the noise is propagated; else 0
 
   static Scale2d FromPixels(double template_px, double sigma_px) {
     return Scale2d(0.0, 2.0 * sigma_px / template_px);
@@ -42,8 +42,7 @@ struct Scale2d : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static Scale2d FromSigma(double sigma) { return Scale2d(sigma, 0.0); }
   explicit Scale2d(Params& p)
       : Scale2d(
-            p.Choice("noise_model", {"propagated", "constant"}, "kind of the noise of 1/scale",
-                     0) == 1
+            p.Choice("noise_model", {"propagated", "constant"}, "noise model of 1/scale", 0) == 1
                 ? FromSigma(p.Positive("sigma_inverse_scale", "", "standard deviation of 1/scale"))
                 : FromPixels(p.Positive("template_px", "px", "width of the template"),
                              p.Positive("sigma_px", "px", "standard deviation of an edge"))) {}

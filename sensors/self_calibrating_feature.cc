@@ -18,5 +18,5 @@ void Make(alidade::Params& p, AlidadeInstance* instance) {
 }  // namespace
 
 ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "self_calibrating_feature",
-                                 "pixel at which a camera with unknown intrinsics sees a point",
+                                 "pixel at which a camera with unknown intrinsics observes a point",
                                  "[Agarwal2010]"))

@@ -37,8 +37,8 @@ struct RadialLens {
   }
 };
 
-/// Lens with focal length, principal point, radial and tangential distortion. It equals `radtan` of
-/// alidade/model/camera.h with square pixels.
+/// Lens with focal length, principal point, radial and tangential distortion. The model is `radtan`
+/// of alidade/model/camera.h with square pixels.
 ///
 ///   z = c + f (x s(q) + 2 p1 x y + p2 (q + 2 x^2),  y s(q) + p1 (q + 2 y^2) + 2 p2 x y)
 ///   s(q) = 1 + k1 q + k2 q^2 + k3 q^3,   q = x^2 + y^2
@@ -88,7 +88,7 @@ struct RadtanLens {
   }
 };
 
-/// Pixel at which a camera sees a point. The intrinsics of the camera are also estimated.
+/// Pixel at which a camera observes a point. The intrinsics of the camera are also estimated.
 ///
 ///   model      (u, v) = K(k; hx/hz, hy/hz) + n,   n ~ N(0, R),   h = R_CW (p - r)
 ///   Jacobian   A = dz/dh:  dz/dr = -A R_CW,  dz/dq = A [h]x,  dz/dp = A R_CW,  dz/dk    2 x n
@@ -102,7 +102,7 @@ struct RadtanLens {
 ///   sigma      2      px      -      standard deviations of u and v; > 0
 ///
 /// Defined for  hz > 0, or hz != 0 if the domain is projective. Otherwise out_of_domain; outputs
-///              unchanged. In BAL and Bundler, P_z may have either sign (p = -P / P_z).
+///              unchanged. In BAL and Bundler problems, the depth may have either sign.
 /// Source       [Agarwal2010], [Brown1971].
 template <class Lens>
 struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens::kSize>, Vec<3>> {
@@ -113,7 +113,7 @@ struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens:
   static constexpr Quantity kMeasurement{"pixel", "px", "pixel of the point", "u,v"};
 
   std::array<double, 2> sigma_px;
-  bool is_projective;  ///< whether points behind the camera are also visible
+  bool is_projective;  ///< true if points behind the camera are also visible
 
   explicit SelfCalibratingFeature(const std::array<double, 2>& sigma, bool projective = false)
       : sigma_px(sigma), is_projective(projective) {}
@@ -124,7 +124,7 @@ struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens:
             p.PerAxis<2>("sigma_px", "px", "standard deviation of u and v: one number, or [u, v]",
                          kPositive),
             p.Choice("domain", {"in_front", "projective"},
-                     "points that are visible: those in front of the camera, or all", 0) == 1} {}
+                     "visible points: points in front of the camera, or all points", 0) == 1} {}
 
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* intrinsics, const T* point,

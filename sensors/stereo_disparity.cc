@@ -3,6 +3,6 @@
 
 #include "alidade/model/plugin.h"
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR(
-    alidade::StereoDisparity, "stereo_disparity",
-    "disparity of one point that a rectified stereo pair sees: d = f B / Z", "[Ekf2017] sec. 1.2"))
+ALIDADE_PLUGIN(ALIDADE_SENSOR(alidade::StereoDisparity, "stereo_disparity",
+                              "disparity of one point in a rectified stereo pair: d = f B / Z",
+                              "[Ekf2017] sec. 1.2"))

@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// Disparity of one point that a rectified stereo pair sees.
+/// Disparity of one point that a rectified stereo pair observes.
 ///
 ///   model      d = f B / Z + n,   n ~ N(0, sigma^2)
 ///   Jacobian   dd/dZ = -f B / Z^2                      1x1, px/m

@@ -14,5 +14,5 @@ void Make(alidade::Params& p, AlidadeInstance* instance) {
 }  // namespace
 
 ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "stereo_feature",
-                                 "pixels at which a rectified stereo pair sees a landmark",
+                                 "pixels at which a rectified stereo pair observes a landmark",
                                  "[MonoSlam2015] sec. 2.2"))

@@ -6,7 +6,7 @@
 
 namespace alidade {
 
-/// Pixels at which a rectified stereo pair sees a landmark.
+/// Pixels at which a rectified stereo pair observes a landmark.
 ///
 ///   model      u = cx + fx hx/hz,  v = cy + fy hy/hz            h = R_CW (rho (a - r) + m)
 ///              u_right = u - fx B rho/hz,  v_right = v,    plus noise n ~ N(0, R)
@@ -17,8 +17,8 @@ namespace alidade {
 ///   symbol     shape  unit    frame  meaning
 ///   u, v       2      px      left   pixel in the left image; u_right, v_right: in the right image
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_left) of the left camera
-///   a, m, rho  -      -       world  the landmark p = a + m / rho; its representation defines them
-///   fx..cy     1      px      -      intrinsics of both cameras, which have no distortion
+///   a, m, rho  -      -       world  landmark p = a + m / rho in the chosen representation
+///   fx to cy   1      px      -      intrinsics of both cameras, which have no distortion
 ///   B          1      m       -      baseline: x of the right camera in the left camera; > 0
 ///   sigma      2      px      -      standard deviations of u and v, in both images; > 0
 ///
@@ -72,7 +72,7 @@ struct StereoFeature : LandmarkSensor<StereoFeature<Representation>, Vec<4>, Rep
     const T mean[2] = {pixels[0], 0.5 * (pixels[1] + pixels[3])};
     T h[3];
     if (!(disparity > T(0.0)) || !camera.Unproject(mean, h)) return false;
-    const T length = sqrt(h[0] * h[0] + h[1] * h[1] + 1.0);  // length of h; the depth of h is 1
+    const T length = sqrt(h[0] * h[0] + h[1] * h[1] + 1.0);  // |h|, because h[2] = 1
     const T rho = disparity / (camera.fx * baseline_m * length);
     return PlaceLandmark<Representation>(position, orientation, h, rho, landmark);
   }

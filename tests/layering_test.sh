@@ -4,33 +4,36 @@
 # tests/layering_test.sh [ROOT]
 # tests/layering_test.sh --self-test [ROOT]
 #
-# Checks the include rules and the forbidden content of sources. Prints one line `FILE:LINE: [rule]
-# text` for each violation; the exit code is 1 if there is any. With --self-test it adds violations
-# of every rule to a copy of the tree and fails unless each is caught.
+# Checks the include rules and the forbidden content of sources. Prints one line `FILE:LINE: [RULE]
+# TEXT` for each violation. The exit code is 1 if there is a violation. With --self-test the script
+# adds violations of every rule to a copy of the tree, and fails unless each of them is caught.
 #
 #   spdx      every source, CMake file and script begins with the licence line
-#   core      core includes only headers of core, tools only those of core and tools, each by its
-#             full path, "alidade/ROOM/FILE.h"
-#   order     a room of core or tools includes itself and earlier rooms in the order of `rooms`;
-#             none includes testing, which is only for tests
+#   core      core includes only headers of core, and tools only headers of core and tools; an
+#             include has the full path, "alidade/ROOM/FILE.h"
+#   order     a room of core or tools includes only itself and earlier rooms in the order of
+#             `rooms`; no room includes testing, which is only for tests
 #   model     motion_models and sensors include only alidade/model/, Eigen, the standard library
-#             and their own stem
-#   plugin    only a plugin's own folder, tests/plugins and tests/fuzz, which test the library
-#             behind the export, include from plugins/; bench includes the costs of plugins/ceres
+#             and the header of their own stem
+#   plugin    headers of plugins/ are included only by the plugin's own folder, and by
+#             tests/plugins and tests/fuzz, which test the code behind the plugin interface; bench
+#             may include the cost functions of plugins/ceres
 #   upward    lower layers do not include cli, bench, tests or examples
-#   library   yaml-cpp, Boost, spdlog, OpenSSL and nlohmann-json only in sources of core and tools;
-#             the forward declarations of nlohmann-json also in core/alidade/io/json.h, which
-#             declares the type for all rooms, and all of nlohmann-json in its test; CLI11 only in
-#             cli and bench, OpenCV only in image plugins, tests/images and bench, Ceres only in
-#             plugins/ceres and bench; model, state and estimation include only Eigen, and base
-#             only the standard library; GoogleTest only in testing and tests
+#   library   only sources of core and tools include yaml-cpp, Boost, spdlog, OpenSSL and
+#             nlohmann-json; core/alidade/io/json.h may also include the forward declarations of
+#             nlohmann-json, because it declares the type for all rooms, and its test may include
+#             all of nlohmann-json; only cli and bench include CLI11; only image plugins,
+#             tests/images and bench include OpenCV; only plugins/ceres and bench include Ceres;
+#             model, state and estimation include no library except Eigen, and base includes only
+#             the standard library; only testing and tests include GoogleTest
 #   exit      core, tools, models and plugins neither exit nor abort (except `_exit` in a file that
 #             forks)
 #   print     core, tools, models and plugins do not print
-#   flags     no instruction-set or fast-math flag in CMake files (except for the deliberately
-#             faulty plugins in tests/faults and tests/plugins)
-#   named     core and tools name neither a shipped C++ plugin nor its file: a plugin declares its
-#             capabilities itself (`csv`, `scene` and `tracks` are also words)
+#   flags     CMake files contain no instruction-set flag and no fast-math flag (except for the
+#             deliberately faulty plugins in tests/faults and tests/plugins)
+#   named     core and tools contain neither the name of a shipped C++ plugin nor the name of its
+#             file: a plugin declares its capabilities itself (`csv`, `scene` and `tracks` are
+#             allowed, because they are also ordinary words)
 set -euo pipefail
 
 self_test=false
@@ -42,7 +45,7 @@ rooms="model base state estimation testing io config plugin experiment evaluate 
 root=$(cd "${1:-$(dirname "${BASH_SOURCE[0]}")/..}" && pwd)
 folders=(core tools motion_models sensors plugins cli bench tests examples)
 
-# Prints the violations in the sources given as arguments.
+# Prints the violations in the sources that are given as arguments.
 sources() {
   awk -v rooms="$rooms" '
     function report(rule, text) { print FILENAME ":" FNR ": [" rule "] " text }
@@ -82,7 +85,7 @@ sources() {
       }
       return out
     }
-    # True if `path` names a file of a plugin other than that of the current file.
+    # Returns true if `path` names a file of a plugin other than that of the current file.
     function of_plugin(path,    base) {
       base = path
       while (sub(/^(\.\.?\/)+/, "", base)) {}
@@ -101,8 +104,8 @@ sources() {
       if (bracket) return path !~ /^[a-z_0-9.]+$/ && path !~ /^(Eigen|sys|linux|boost|yaml-cpp|spdlog|openssl|nlohmann)\//
       return 1
     }
-    # Returns the position of the room of `path`, "core/alidade/base/x.h" or "alidade/base/x.h", in
-    # the order.
+    # Returns the position of the room of `path` in the order of `rooms`. `path` is, for example,
+    # "core/alidade/base/x.h" or "alidade/base/x.h".
     function floor_of(path) {
       sub(/^(core|tools)\//, "", path)
       sub(/^alidade\//, "", path)
@@ -190,7 +193,7 @@ sources() {
     }' "$@"
 }
 
-# Scripts and CMake files: the licence line comes first, or after `#!`.
+# Checks scripts and CMake files: the licence line must be the first line, or the line after `#!`.
 licences() {
   awk '
     FNR == 1 && /^#!/ { below = 1; next }
@@ -209,7 +212,7 @@ flags() {
     }' "$@"
 }
 
-# Prints all violations in the tree at $1, or those of its file $2 only.
+# Prints all violations in the tree at $1, or only the violations in its file $2.
 violations() {
   cd "$1"
   local only=${2:-}
@@ -249,7 +252,7 @@ check() {
 
 if ! $self_test; then
   check "$root" || exit 1
-  echo "layering: nothing found"
+  echo "layering: no violations"
   exit 0
 fi
 
@@ -275,7 +278,7 @@ plant() {
   printf '%b\n' "$text" >>"$file"
   found=$(violations "$copy" "$2")
   if ! grep -qF "$2:$(wc -l <"$file"): [$rule]" <<<"$found"; then
-    echo "not caught: [$rule] $2: $text"
+    echo "violation was not reported: [$rule] $2: $text"
     failed=$((failed + 1))
   fi
   if $existed; then mv "$file.kept" "$file"; else rm "$file"; fi
@@ -293,13 +296,13 @@ allow() {
   printf '%b\n' "$2" >>"$file"
   found=$(violations "$copy" "$1" | grep -F "$1:" || true)
   if [[ -n $found ]]; then
-    echo "wrongly caught: $found"
+    echo "allowed content was reported: $found"
     failed=$((failed + 1))
   fi
   if $existed; then mv "$file.kept" "$file"; else rm "$file"; fi
 }
 
-check "$copy" || { echo "the tree itself is not clean"; failed=1; }
+check "$copy" || { echo "the unchanged tree already has violations"; failed=1; }
 
 plant spdx core/alidade/experiment/new.cc 'int x;'
 plant spdx sensors/new.h '#pragma once'
@@ -405,5 +408,5 @@ allow tests/faults/CMakeLists.txt '# SPDX-License-Identifier: Apache-2.0\nadd_co
 allow tests/plugins/CMakeLists.txt '# SPDX-License-Identifier: Apache-2.0\nadd_compile_options(-march=native)'
 allow cmake/New.cmake '# SPDX-License-Identifier: Apache-2.0\n# never -march=native'
 
-echo "layering: $planted planted, $failed not as expected"
+echo "layering: $planted cases, $failed with an unexpected result"
 ((failed == 0))

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Accuracy of the depth filter on real series, compared with stereo alone, the last value and the
-// line d = c s. Parameters are tuned on every second series; results are reported for the others:
+// Measures the accuracy of the depth filter on real series. Compares the filter with stereo alone,
+// the last value and the line d = c s. Tunes the parameters on every second series, and reports
+// results for the other series:
 //
 //   accuracy_depth_pairs examples/07_depth_pairs/config.yaml FOLDER_OF_SERIES
 //
@@ -30,7 +31,7 @@ using Settings = std::vector<std::pair<std::string, std::string>>;
 using Names = std::vector<std::string>;
 using RmseByEstimator = std::map<std::string, double>;
 
-/// Parameter, with its values in ascending order.
+/// Parameter of a grid search, with its values in ascending order.
 struct Axis {
   std::string key;
   Names values;
@@ -64,8 +65,8 @@ struct Bench {
     return alidade::BuildExperiment(config, host);
   }
 
-  /// Returns the RMSE of the depth of each estimator. If `masked` is true, it is that of the blind
-  /// half of the series, else that of the whole series.
+  /// Returns the RMSE of the depth of each estimator. If `masked` is true, the RMSE is that of the
+  /// blind half of the series. Otherwise it is that of the whole series.
   RmseByEstimator Rmse(const std::string& series, const Settings& settings, bool masked) const {
     alidade::Experiment experiment = Make(series, settings, masked);
     RmseByEstimator rmse;
@@ -113,20 +114,21 @@ Choice Choose(const Bench& bench, const std::string& estimator, const std::vecto
     const double mean = std::exp(sum / static_cast<double>(series.size()));
     if (mean < best.geometric_mean) best = {settings, mean};
   });
-  std::printf("%s, geometric mean %.3f m on %zu series:\n", estimator.c_str(), best.geometric_mean,
-              series.size());
+  std::printf("%s: geometric mean of the RMSE %.3f m, over %zu series\n", estimator.c_str(),
+              best.geometric_mean, series.size());
   for (std::size_t i = 0; i < grid.size(); ++i) {
     const Names& values = grid[i].values;
     const std::string& value = best.settings[i].second;
     const bool at_edge = value == values.front() || value == values.back();
     best.at_edge |= at_edge;
-    std::printf("  %s = %s, of %s to %s%s\n", grid[i].key.c_str(), value.c_str(),
+    std::printf("  %s = %s, grid from %s to %s%s\n", grid[i].key.c_str(), value.c_str(),
                 values.front().c_str(), values.back().c_str(), at_edge ? ": AT THE EDGE" : "");
   }
   return best;
 }
 
-/// Chooses the settings of the fused filter and of stereo alone, by their RMSE on the given series.
+/// Returns the settings of the fused filter and of stereo alone that minimise the RMSE on the given
+/// series.
 Choice ChooseAll(const Bench& bench, const Names& series) {
   Choice choice = Choose(bench, "fused", kFusedGrid, series);
   const Choice stereo = Choose(bench, "stereo_only", kStereoGrid, series);
@@ -140,7 +142,7 @@ double Median(std::vector<double> values) {
   return alidade::Quantile(values, 0.5);
 }
 
-/// Printed table of RMSE [m]. The last row contains the medians.
+/// Table that is printed row by row. Medians() prints the last row.
 class Table {
  public:
   explicit Table(Names columns) : columns_(std::move(columns)), values_(columns_.size()) {
@@ -201,7 +203,7 @@ void PrintDifference(const char* title, const std::vector<double>& differences) 
 /// Prints the standard deviation of the white noise of both sensors, and the drift of the scale.
 void ReportNoise(const Bench& bench, const Names& files) {
   double disparity = 0.0, log_scale = 0.0;
-  std::printf("\nrms growth of log(s Z), %%, over\n");
+  std::printf("\nrms growth of log(s Z) in %%, for several lags:\n");
   Names columns;
   for (const double lag_s : kShownLagsS)
     columns.push_back(std::to_string(lag_s).substr(0, 3) + " s");
@@ -239,16 +241,16 @@ int Main(const std::string& config, const std::string& folder) {
   ReportNoise(bench, tuning);
   std::printf("\n");
   const Choice choice = ChooseAll(bench, tuning);
-  std::vector<double> differences = Report("reported", bench, choice.settings, reported);
-  PrintDifference("reported", differences);
-  Report("tuned on", bench, choice.settings, tuning);
+  std::vector<double> differences = Report("reported series", bench, choice.settings, reported);
+  PrintDifference("reported series", differences);
+  Report("series used for tuning", bench, choice.settings, tuning);
 
-  std::printf("\nthe halves exchanged:\n");
+  std::printf("\nexchanged halves:\n");
   const Choice exchanged = ChooseAll(bench, reported);
   const std::vector<double> exchanged_differences =
-      Report("the first half", bench, exchanged.settings, tuning);
+      Report("reported series", bench, exchanged.settings, tuning);
   differences.insert(differences.end(), exchanged_differences.begin(), exchanged_differences.end());
-  PrintDifference("each series with the settings of the other half", differences);
+  PrintDifference("all series, each with the settings of the other half", differences);
   return choice.at_edge ? 1 : 0;
 }
 

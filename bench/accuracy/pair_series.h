@@ -12,7 +12,7 @@ namespace alidade::bench {
 struct PairRow {
   double t_s;
   double disparity_px;
-  double scale;    ///< distance of the points in the left image, relative to the first row
+  double scale;    ///< distance of the points in the left image / distance in the first row
   double depth_m;  ///< reference depth
 };
 
@@ -57,8 +57,8 @@ inline double LineRmse(const PairSeries& series) {
 }
 
 /// Returns the RMSE [m], in the blind half, of the depth Z = Za sa / s. Za is the reference depth
-/// and sa the scale of the last row in which stereo measures. This is the error that the drift of
-/// the scale adds to an exact depth.
+/// and sa is the scale of the last row in which stereo measures. This is the error that the drift
+/// of the scale adds to an exact depth.
 inline double AnchoredRmse(const PairSeries& series) {
   const PairRow& last = series.rows[series.seen_count - 1];
   return BlindRmse(series, last.depth_m * last.scale);
@@ -90,9 +90,9 @@ inline double DriftVariance(const PairSeries& series, std::size_t lag) {
   return sum / static_cast<double>(rows.size() - lag);
 }
 
-/// Returns the variance of the white noise of y = value(row), over the rows in which stereo
-/// measures. Computes it from second differences, which a ramp does not change: mean (y[i-1] - 2
-/// y[i] + y[i+1])^2 / 6.
+/// Returns the variance of the white noise of y = value(row) over the rows in which stereo
+/// measures. The variance follows from second differences, which a ramp does not change: mean
+/// (y[i-1] - 2 y[i] + y[i+1])^2 / 6.
 template <class Value>
 double WhiteVariance(const PairSeries& series, const Value& value) {
   double sum = 0.0;

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Accuracy and cost of a filter and of the batch, compared as in [Strasdat2012]: on the same
-// trajectory, with different numbers of points and frames.
+// Compares the accuracy and the cost of a filter and of the batch in the way of [Strasdat2012]: on
+// the same trajectory, with different numbers of points and frames. "The smallest filter" has the
+// smallest numbers of points and frames.
 //
 //   accuracy_why_filter examples/10_slam_scene/sweep_batch.yaml FOLDER [SEEDS]
 //
 // This command runs the seeds 1001, 1002, ... It writes FOLDER/figures/why_filter.svg and
 // FOLDER/why_filter.csv, with the columns
 //
-//   rmse      sqrt(mean |e|^2) of the position at the last frame
+//   rmse_m    sqrt(mean |e|^2) of the position at the last frame, m
 //   bits      mean of E = 1/2 log2(det C_0 / det C), with the 6 x 6 covariance C of the last pose,
 //             and C_0 of the smallest filter
 //   cpu       median time of the whole trajectory, relative to the smallest filter
@@ -62,7 +63,7 @@ alidade::Config ConfigOf(const std::string& file, int points, int frames, int se
   config.Set("source.seed", std::to_string(seed), "bench");
   config.Set("source.points.count", std::to_string(points), "bench");
   config.Set("source.max_frames", std::to_string(frames), "bench");
-  const double fraction = (frames - 1.0) / (kAllFrames - 1.0);  // number of steps, relative to all
+  const double fraction = (frames - 1.0) / (kAllFrames - 1.0);  // steps / all steps
   set("source.rate_hz", kAllRateHz * fraction);
   for (const char* key : {"linear_acceleration", "angular_acceleration"}) {
     const std::string path = std::string("state.cam.noise.") + key;
@@ -158,7 +159,7 @@ std::vector<Row> Measure(const std::string& config, int seeds) {
         const auto found = outcomes.find(candidate.estimator);
         if (found == outcomes.end()) {
           throw alidade::Error(alidade::ExitCode::kBadConfig,
-                               config + ": needs the estimators 'ekf' and 'batch'");
+                               config + ": the config needs the estimators 'ekf' and 'batch'");
         }
         if (found->second.is_valid) candidate.runs.push_back(found->second);
       }
@@ -179,7 +180,7 @@ void Write(const std::vector<Row>& rows, const std::filesystem::path& file) {
     throw alidade::Error(alidade::ExitCode::kDiverged,
                          "no run of '" + smallest.estimator + "' with " +
                              std::to_string(smallest.points) + " points and " +
-                             std::to_string(smallest.frames) + " frames finished");
+                             std::to_string(smallest.frames) + " frames succeeded");
   }
   for (const Row& row : rows) {
     if (row.runs.empty()) continue;
@@ -191,7 +192,7 @@ void Write(const std::vector<Row>& rows, const std::filesystem::path& file) {
                 row.frames, row.runs.size(), 1e3 * row.Rmse(), bits, cpu);
   }
   if (!csv.flush()) {
-    throw alidade::Error(alidade::ExitCode::kIo, file.string() + ": cannot be written");
+    throw alidade::Error(alidade::ExitCode::kIo, file.string() + ": the file cannot be written");
   }
 }
 
@@ -199,7 +200,7 @@ void Write(const std::vector<Row>& rows, const std::filesystem::path& file) {
 void Draw(const std::vector<Row>& rows, const std::filesystem::path& folder) {
   using alidade::internal::FigureScript;
   FigureScript script("why_filter", "accuracy against cost: filter and batch",
-                      "CPU time of the trajectory, in units of the smallest filter's");
+                      "CPU time of the trajectory, relative to the smallest filter");
   script.PanelHeight(220);
   script.Set("set logscale x\nset format x '%g'");
   const alidade::internal::FigureFile file{"why_filter.csv",
@@ -222,9 +223,9 @@ void Draw(const std::vector<Row>& rows, const std::filesystem::path& folder) {
       }
     }
   };
-  panel("final position, RMSE; frames used from left to right: 10, 19, 38, 75, 150", "[mm]",
+  panel("RMSE of the final position; marks: 10, 19, 38, 75 and 150 frames", "[mm]",
         "set logscale y", "1e3 * column('rmse_m')");
-  panel("entropy of the last pose, reduction compared with the smallest filter", "[bits]",
+  panel("reduction of the entropy of the last pose, relative to the smallest filter", "[bits]",
         "unset logscale y", "column('bits')");
   std::filesystem::create_directories(folder / "figures");
   std::ofstream(folder / "figures" / "why_filter.gp") << script.Text();

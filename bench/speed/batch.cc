@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of an iteration of the sparse batch, for a camera with 12 unknowns and 40 observations per
-// frame. Tracks have 20 to 40 frames; a tenth of the tracks have 80 to 120. Depth is known to 1 m
-// at the first observation, the noise has rank 6 of 12, and the first pose is exact. The peer is
-// Ceres with hand-written costs for the same observations, with analytic Jacobians. Ceres needs
-// noise of full rank (white acceleration). Its problem has the same structure, and only the time is
-// compared.
+// Measures the time of an iteration of the sparse batch, for a camera with 12 unknowns and 40
+// observations per frame. Tracks have 20 to 40 frames; a tenth of the tracks have 80 to 120. The
+// depth is known to 1 m at the first observation, the process noise has rank 6 of 12, and the first
+// pose is exact. The peer is Ceres with hand-written costs and analytic Jacobians for the same
+// observations. Ceres needs process noise of full rank (white acceleration). The problem of Ceres
+// has the same structure, but only its time can be compared.
 //
-//   bench_batch [--frames N]... [--iterations N]
+//   bench_batch [--frames N]... [--iterations N] [--ceres N]
 //
-//   ratio batch/ceres VALUE     iteration of the batch / iteration of the faster solver of Ceres
-//   exponent VALUE              growth of the time of an iteration with the number of frames
+//   ratio batch/ceres VALUE     time of an iteration: batch / the faster solver of Ceres
+//   exponent VALUE              exponent b of (time of an iteration) ~ (number of frames)^b
 #include <ceres/cost_function.h>
 #include <ceres/manifold.h>
 #include <ceres/problem.h>
@@ -80,7 +80,7 @@ Vector3d Log(const Quaterniond& q) {
                   : Vector3d(2.0 * sign * std::atan2(n, sign * q.w()) / n * q.vec());
 }
 
-/// Simulated data for both solvers, with a start near the truth.
+/// Simulated data for both solvers, with initial values near the truth.
 struct Scene {
   std::vector<Pose> truth, start;
   std::vector<Vector3d> landmarks;
@@ -194,8 +194,8 @@ Problem BuildProblem(const Scene& scene) {
   return problem;
 }
 
-/// Estimator that reports the kind of each measurement, and provides the start in place of a
-/// filter.
+/// Estimator that reports the outcome of each measurement. It replaces the filter that would
+/// provide the initial values.
 class StartEstimator : public Estimator {
  public:
   StartEstimator(const Problem& problem, const Scene& scene)
@@ -343,8 +343,8 @@ struct Observation : ceres::SizedCostFunction<kRows, 7, 3> {
   }
 };
 
-/// Cost of a step with white acceleration, with Q of full rank. The derivative of Exp is that at
-/// zero, because only the time of the cost matters.
+/// Cost of a step with white acceleration, so that Q has full rank. The derivative of Exp is the
+/// derivative at zero, because only the time of the cost matters.
 struct Step : ceres::SizedCostFunction<12, 7, 6, 7, 6> {
   Matrix12d whiten;
   Step() {
@@ -491,7 +491,7 @@ int main(int argc, char** argv) {
   CLI::App app{"Time of an iteration of the sparse batch compared with Ceres"};
   std::vector<int> frames{500, 1000, 5000, 20000};
   int iterations = 5, max_ceres_frames = 5000;
-  app.add_option("--frames", frames, "lengths of the series");
+  app.add_option("--frames", frames, "numbers of frames of the series");
   app.add_option("--iterations", iterations, "number of timed iterations");
   app.add_option("--ceres", max_ceres_frames, "maximum number of frames for Ceres");
   CLI11_PARSE(app, argc, argv);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// CPU time per frame of monocular SLAM from images, relative to that of the optical flow of OpenCV:
-// cv::calcOpticalFlowPyrLK on the same features in the same images:
+// Measures the CPU time per frame of monocular SLAM from images. The times are relative to that of
+// cv::calcOpticalFlowPyrLK, the optical flow of OpenCV, for the same features in the same images:
 //
 //   bench_image_tracks examples/25_slam_images
 //
 // This program draws the images of the example and stores them as files. The source `image_tracks`
-// reads them for the EKF of the example, with and without guidance by this EKF. The parts of the
-// source are measured by separate calls. The remaining time is that of the alignment and of the
+// reads these files for the EKF of the example, with and without guidance by this EKF. The parts of
+// the source are measured by separate calls. The remaining time is that of the alignment and of the
 // search for new features.
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -78,7 +78,8 @@ struct Part {
 /// CPU times of a frame, and of cv::calcOpticalFlowPyrLK on the features of the previous frame.
 class Times {
  public:
-  /// Processes the images of a folder once, frame by frame. Measures each part in turn.
+  /// Processes the images of a folder once, frame by frame. Measures the time of each part
+  /// separately.
   void Add(const Config& config, const PluginHost& host, const fs::path& folder) {
     Experiment experiment = BuildExperiment(config, host);
     is_guided_ = experiment.guide != nullptr;
@@ -155,7 +156,7 @@ class Times {
       part("  track forward", forward_);
       part("  track backward", back_);
     }
-    line("  align, check, search for new ones", remaining_ns);
+    line("  align, check, search for new features", remaining_ns);
     line("filter", filter_.Mean());
     line("front end and filter", total);
     const std::string prefix = is_guided_ ? "guided_" : "";
@@ -165,7 +166,8 @@ class Times {
   }
 
  private:
-  /// Measures the parts of the optical flow in the way that PyramidFlow computes it.
+  /// Measures the parts of the optical flow, which this function computes in the same way as
+  /// PyramidFlow.
   void Flow(int k, const std::vector<cv::Mat>& last, const std::vector<cv::Mat>& next,
             const std::vector<cv::Point2f>& start, std::vector<cv::Point2f>& end) {
     const cv::TermCriteria stop{cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.01};
@@ -197,7 +199,7 @@ int Main(int argc, char** argv) {
   std::vector<std::string> settings;
   int rounds = 5;
   app.add_option("example", example, "folder examples/25_slam_images")->required();
-  app.add_option("--set", settings, "KEY=VALUE of the config");
+  app.add_option("--set", settings, "setting KEY=VALUE of the config");
   app.add_option("--rounds", rounds, "number of passes over the images")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   cv::setNumThreads(1);

@@ -8,15 +8,16 @@
 #include <string>
 #include <vector>
 
-/// Timing of contenders in turn. One short chunk of each contender is run, repeatedly. Disturbances
-/// of the machine therefore affect all contenders equally. Only ratios of times are meaningful.
+/// Measures the times of several contenders in turn: repeatedly runs one short chunk of each
+/// contender. Disturbances of the machine therefore affect all contenders equally. Only ratios of
+/// times are meaningful.
 namespace alidade::bench {
 
 struct Contender {
   std::string name;
-  std::function<void()> chunk;  ///< work to time, about 0.4 ms
+  std::function<void()> chunk;  ///< measured work, about 0.4 ms
   double steps = 1.0;           ///< number of steps in a chunk
-  std::vector<double> ns;       ///< CPU time per step of each chunk
+  std::vector<double> ns;       ///< CPU time per step, for each chunk
 
   /// Returns the q-quantile of the time per step.
   double Quantile(double q) const {
@@ -45,7 +46,7 @@ inline void Interleave(std::vector<Contender>& contenders, int rounds) {
 /// Prints the 1st percentile and the median of the times of the contenders, relative to the first
 /// contender.
 inline void PrintTable(const std::vector<Contender>& contenders) {
-  std::printf("%-36s %8s %8s\n", "relative to the first, CPU time", "p01", "median");
+  std::printf("%-36s %8s %8s\n", "CPU time, relative to the first", "p01", "median");
   for (const Contender& contender : contenders) {
     std::printf("%-36s %8.2f %8.2f\n", contender.name.c_str(),
                 contender.Quantile(0.01) / contenders[0].Quantile(0.01),

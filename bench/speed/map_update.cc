@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of a frame in which the EKF measures 20 of 1000 landmarks. The bias of the sensor is either
-// estimated or considered. The times are relative to that of P - W W' alone, of the same size.
+// Measures the time of a frame in which the EKF measures 20 of 1000 landmarks. The bias of the
+// sensor is either an estimated state or a consider state. The times are relative to the time of P
+// - W W' alone, with matrices of the same size.
 #include <CLI/CLI.hpp>
 #include <array>
 #include <cmath>
@@ -103,7 +104,7 @@ class Run {
 int Main(int argc, char** argv) {
   CLI::App app("Time per frame of an EKF with 1000 landmarks, relative to P - W W' alone");
   int rounds = 20;
-  app.add_option("--rounds", rounds, "frames of each contender")->capture_default_str();
+  app.add_option("--rounds", rounds, "number of frames for each contender")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
 
   Run estimated(BlockStatus::kEstimated), considered(BlockStatus::kConsider);
@@ -115,8 +116,8 @@ int Main(int argc, char** argv) {
        [&] { p.selfadjointView<Eigen::Lower>().rankUpdate(w, -1.0); },
        1.0,
        {}},
-      {"EKF, the bias estimated", [&] { estimated(); }, 1.0, {}},
-      {"EKF, the bias considered", [&] { considered(); }, 1.0, {}}};
+      {"EKF, bias is estimated", [&] { estimated(); }, 1.0, {}},
+      {"EKF, bias is considered", [&] { considered(); }, 1.0, {}}};
   Interleave(contenders, rounds);
   if (!estimated.has_used_all() || !considered.has_used_all()) {
     std::fprintf(stderr, "error: not every measurement was accepted\n");

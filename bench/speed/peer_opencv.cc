@@ -7,7 +7,7 @@ namespace alidade::bench {
 namespace {
 
 /// cv::KalmanFilter used as an extended Kalman filter. H is evaluated at the prediction, z + H x -
-/// h(x) replaces z, and each sensor has a correction of its own.
+/// h(x) replaces z, and each sensor has a separate correction.
 class OpenCv : public Peer {
  public:
   OpenCv() : filter_(3, 1, 0, CV_64F), z_(1, 1, CV_64F) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of an iteration of Ceres on a bundle adjustment with costs made from a sensor model. The
-// reference is the same problem with cost functions written by hand. It has 50 cameras, 2000 points
-// and 20 000 pixels.
+// Measures the time of an iteration of Ceres on a bundle adjustment. The costs are created from a
+// sensor model. The reference is the same problem with hand-written cost functions. The problem has
+// 50 cameras, 2000 points and 20 000 pixels.
 #include "plugins/ceres/bundle/sensor_cost.h"
 
 #include <ceres/autodiff_cost_function.h>
@@ -35,7 +35,7 @@ using ceres_batch::GeometryManifold;
 using ceres_batch::SensorCost;
 
 constexpr double kFocal = 500.0;  // px
-constexpr int kPose = 7;          // size of position and world_from_cam
+constexpr int kPose = 7;          // numbers in position and world_from_cam
 
 /// Model z = f (hx, hy) / hz,  h = R_CW (p - r), without analytic Jacobians.
 struct Pinhole : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>> {
@@ -48,7 +48,7 @@ struct Pinhole : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>> {
     T h[3];
     UnitQuaternion::RotateBack(orientation, offset, h);
     if (!(h[2] > T(0.0))) return false;
-    const T inverse = 1.0 / h[2];  // as in the Jacobian, so one division serves both
+    const T inverse = 1.0 / h[2];  // the Jacobian uses the same quotient
     z[0] = kFocal * (h[0] * inverse);
     z[1] = kFocal * (h[1] * inverse);
     return true;
@@ -59,8 +59,8 @@ struct Pinhole : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>> {
   }
 };
 
-/// Computes a row of the Jacobian with respect to all roles. The authors of a model and of a cost
-/// write it in the same way.
+/// Computes a row of the Jacobian with respect to all roles. The model and the hand-written cost
+/// share this function.
 inline void Row(const double* orientation, const double* h, double ax, double ay, double x,
                 double y, double* J_r, double* J_q, double* J_p) {
   const double a[3] = {ax, ay, -(ax * x + ay * y)};
@@ -115,7 +115,7 @@ class HandWrittenCost final : public ceres::SizedCostFunction<2, kPose, 3> {
   double u_, v_;
 };
 
-/// Cost r = z - h, written as users of Ceres do, with automatic differentiation.
+/// Cost r = z - h for the automatic differentiation of Ceres, as users of Ceres write it.
 struct Functor {
   double u, v;
   template <class T>
@@ -132,8 +132,8 @@ struct Functor {
   }
 };
 
-/// Cameras on a circle that look at points in a box. Points start 1 % off the truth. The noise is
-/// 0.5 px.
+/// Cameras on a circle that look at points in a box. The initial points deviate from the truth by
+/// up to 1 % of half the side of the box. The pixels have errors of up to 0.5 px.
 struct Scene {
   static constexpr int kCameras = 50, kPoints = 2000, kViewsPerPoint = 10;
   struct Pixel {
@@ -172,7 +172,7 @@ struct Scene {
   }
 };
 
-/// Bundle adjustment with one way to make costs. It has its own copy of all values.
+/// Bundle adjustment with the costs of one contender, and with a separate copy of all values.
 class Adjustment {
  public:
   using MakeCost = std::function<ceres::CostFunction*(const double* z)>;
@@ -192,8 +192,8 @@ class Adjustment {
     problem_.SetParameterBlockConstant(poses_.data());
   }
 
-  /// Runs three iterations from the start. Returns the CPU time per iteration, ms. More iterations
-  /// would reach the minimum. Rounding would then decide whether a step succeeds and needs
+  /// Runs three iterations from the initial values. Returns the CPU time per iteration, ms. More
+  /// iterations would reach the minimum. There, rounding decides whether a step succeeds and needs
   /// Jacobians.
   double Iterate() {
     poses_ = scene_.poses;
@@ -249,7 +249,7 @@ double QuantileOf(std::vector<double> values, double q) {
   return Quantile(values, q);
 }
 
-/// Contenders: each way to make costs, with the peer of each.
+/// Contenders: kinds of costs. Each contender has a peer, to which its times are compared.
 struct Contenders {
   PinholeAnalytic analytic;
   Pinhole automatic;
@@ -317,8 +317,8 @@ int Main(int rounds) {
     };
     for (int round = 0; round < rounds; ++round) {
       for (std::size_t i = 0; i < times.size(); ++i) {
-        // Times two solves between two solves of the peer, so that changes of the machine's speed
-        // cancel.
+        // Measures two solves between two solves of the peer, so that changes of the machine's
+        // speed cancel.
         const double peer_before = iterate(contenders.all[i].peer), first = iterate(i),
                      second = iterate(i);
         times[i].ratios.push_back((first + second) /
@@ -331,12 +331,12 @@ int Main(int rounds) {
                 "ms/iteration", "ns/cost", "ratio (10 % to 90 %)");
     for (std::size_t i = 0; i < times.size(); ++i) {
       if (std::abs(adjustments[i]->cost() / adjustments[0]->cost() - 1.0) > 1e-6) {
-        std::fprintf(stderr, "error: %s ends at the cost %.12g, the costs by hand at %.12g\n",
+        std::fprintf(stderr, "error: the final cost of %s is %.12g, that of 'by hand' is %.12g\n",
                      contenders.all[i].name, adjustments[i]->cost(), adjustments[0]->cost());
         return 1;
       }
       if (adjustments[i]->jacobian_evaluations() != adjustments[0]->jacobian_evaluations()) {
-        std::fprintf(stderr, "error: %s evaluates Jacobians %d times, the costs by hand %d times\n",
+        std::fprintf(stderr, "error: %s evaluates Jacobians %d times, but 'by hand' %d times\n",
                      contenders.all[i].name, adjustments[i]->jacobian_evaluations(),
                      adjustments[0]->jacobian_evaluations());
         return 1;
@@ -355,10 +355,9 @@ int Main(int rounds) {
 
 int main(int argc, char** argv) {
   CLI::App app{
-      "Time of an iteration of Ceres on costs made from sensor models, relative to others."};
+      "Time of an iteration of Ceres on costs from sensor models, relative to other costs."};
   int rounds = 15;
-  app.add_option("--rounds", rounds,
-                 "Number of comparisons of each contender with its peer, of two solves each")
+  app.add_option("--rounds", rounds, "Number of comparisons of each contender with its peer")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);

@@ -1,23 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of a whole frame of the EKF at the size of SLAM. The state is a camera with 13 numbers, and
-// N landmarks in inverse depth. Some landmarks are observed. The time is compared with
+// Measures the time of a whole frame of the EKF at the size of SLAM. The state is a camera with 13
+// numbers, and N landmarks in inverse depth. Each frame observes some landmarks. The time is
+// compared with
 //
 //   peak      the operations of the update alone, at the rate at which this processor multiplies
-//             and adds; this rate is measured in turn with frames and nothing else
+//             and adds; this rate is measured alternately with frames, without other contenders
 //   mrpt      mrpt::bayes::CKalmanFilterCapable, if it is installed, up to 300 landmarks
 //   textbook  the update with dense H in Eigen, as compiled by this build: K = P H' S^-1,
 //             P = (I - K H) P
-//   joseph    the same with P = (I - K H) P (I - K H)' + K R K'
+//   joseph    the update with dense H in Eigen: P = (I - K H) P (I - K H)' + K R K'
 //   openblas  the factor of S, W = P H' L^-T and P - W W' by OpenBLAS, if it is installed; the
 //             other parts of a frame are omitted. OPENBLAS_CORETYPE selects the type of a
 //             processor that OpenBLAS does not detect.
 //
-// The others are also measured in turn with frames. The data of the frames are then displaced from
-// the caches.
+// The other contenders are also measured in turn with frames. They displace the data of the frames
+// from the caches.
 //
-// The program then prints the exponents of time over the number of states. It does so for a step,
-// for a frame that measures 20 landmarks, and for the exchange of a landmark for a new one.
+// The program then prints the exponent b of time ~ (number of states)^b for a prediction, for a
+// frame that measures 20 landmarks, and for the replacement of a landmark by a new landmark.
 //
 //   bench_slam [--size N/observed ...] [--no-exponents]
 #include <CLI/CLI.hpp>
@@ -80,7 +81,7 @@ sensors:
 estimators: {ekf: {type: ekf}}
 )";
 
-/// Filter with frames of a camera that oscillates in front of a box of points. Each frame observes
+/// Filter, and frames of a camera that oscillates in front of a box of points. Each frame observes
 /// the next `observed` points in turn.
 class Slam {
  public:
@@ -137,7 +138,7 @@ double UpdateOperations(double n, double m) {
   return 2.0 * 12.0 * n * m + 12.0 * m * m + m * m * m / 3.0 + n * m * m + n * n * m;
 }
 
-/// Contender of multiplications and additions in registers, without memory access.
+/// Contender that multiplies and adds numbers in registers, without memory access.
 template <int kLanes>
 struct Multiply {
   using Vector [[gnu::vector_size(kLanes * sizeof(double))]] = double;
@@ -354,10 +355,11 @@ int Main(int argc, char** argv) {
   int rounds = 15;
   bool peers = true;
   std::vector<std::string> sizes = {"30/20", "100/20", "300/20", "1000/20", "100/100", "300/300"};
-  app.add_option("--rounds", rounds, "frames of each contender")->capture_default_str();
-  app.add_option("--size", sizes, "landmarks/observed")->capture_default_str();
+  app.add_option("--rounds", rounds, "number of frames for each contender")->capture_default_str();
+  app.add_option("--size", sizes, "number of landmarks / number of observed landmarks")
+      ->capture_default_str();
   std::vector<std::string> settings;
-  app.add_option("--set", settings, "KEY=VALUE of the config");
+  app.add_option("--set", settings, "setting KEY=VALUE of the config");
   app.add_flag("--peers,!--no-peers", peers, "also measure the dense update and other libraries");
   bool exponents = true;
   app.add_flag("--exponents,!--no-exponents", exponents,

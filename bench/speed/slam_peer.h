@@ -6,7 +6,7 @@
 namespace alidade::bench {
 
 /// EKF of another library. Its covariance has 12 rows for the camera and 6 rows for each landmark.
-/// Its models are constants and take no time. Only the arithmetic of the library is measured.
+/// Its models return constants, so only the arithmetic of the library is measured.
 class SlamPeer {
  public:
   virtual ~SlamPeer() = default;
@@ -14,7 +14,8 @@ class SlamPeer {
   virtual void Frame() = 0;
 };
 
-// Creates the EKF of MRPT with its fastest method of updating. Built if MRPT is installed.
+// Creates the EKF of MRPT with the fastest update method of MRPT. This function is built if MRPT is
+// installed.
 std::unique_ptr<SlamPeer> MakeMrptSlam(int landmarks, int observed);
 
 }  // namespace alidade::bench

@@ -11,7 +11,7 @@ namespace {
 class Mrpt : public SlamPeer, public mrpt::bayes::CKalmanFilterCapable<12, 2, 6, 0> {
  public:
   Mrpt(int landmarks, int observed) : landmarks_(landmarks), observed_(observed) {
-    KF_options.method = mrpt::bayes::kfEKFAlaDavison;  // two to four times as fast as the others
+    KF_options.method = mrpt::bayes::kfEKFAlaDavison;  // 2 to 4 times as fast as other methods
     KF_options.enable_profiler = false;
     const int n = 12 + 6 * landmarks;
     m_xkk.setZero(n);

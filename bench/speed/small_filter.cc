@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of one step of a small filter, relative to hand-unrolled code. A step is a prediction and
-// two scalar measurements with gates, see depth_step.h. The filters of other libraries have no
-// gates.
+// Measures the time of one step of a small filter, relative to hand-unrolled code. A step is a
+// prediction and two scalar measurements with gates, see depth_step.h. The filters of other
+// libraries have no gates.
 #include <CLI/CLI.hpp>
 #include <Eigen/Core>
 
@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kGate = 0.999;
 
-/// Baseline, with every operation unrolled by hand. Such code is tedious to write.
+/// Baseline: a filter in which every operation is unrolled by hand.
 class HandUnrolled {
  public:
   void Step(double disparity, double inverse_scale) {
@@ -54,7 +54,7 @@ class HandUnrolled {
     const double al = plz_ * lambda_ + pll_ * z_;
     Correct(az, av, al, 1.0 / (az * lambda_ + al * z_ + sigma * sigma), inverse_scale - s);
   }
-  /// Corrects the state. The elements of a = P H', 1/S and the innovation r are given.
+  /// Corrects the state. The arguments are the elements of a = P H', 1 / S, and the innovation r.
   void Correct(double az, double av, double al, double inverse_s, double r) {
     if (!(r * r * inverse_s <= gate_)) return;
     const double k = r * inverse_s;
@@ -77,7 +77,7 @@ class HandUnrolled {
   double pzz_ = 0.01, pvz_ = 0.0, pvv_ = 0.25, plz_ = 0.0, plv_ = 0.0, pll_ = 0.25;
 };
 
-/// Textbook filter with carefully written matrices of fixed size.
+/// Textbook filter with Eigen matrices of fixed size.
 class FixedEigen {
  public:
   FixedEigen() {
@@ -114,7 +114,7 @@ class FixedEigen {
   Eigen::Matrix3d f_, q_, p_ = Eigen::Matrix3d::Zero();
 };
 
-/// Filter of shipped models, composed at compile time.
+/// Filter that is composed of shipped models at compile time.
 class StaticFilter {
  public:
   StaticFilter() {
@@ -137,7 +137,7 @@ class StaticFilter {
       ConstantVelocity<1, false>(kAcceleration), Constant<1>(1)};
 };
 
-/// Filter engine. Its input is a frame; its output is a report with all measurements.
+/// Filter engine: processes a frame, and returns a report on all measurements.
 class Engine {
  public:
   explicit Engine(Problem problem) {
@@ -161,7 +161,7 @@ class Engine {
   Frame frame_;
 };
 
-/// Returns the problem with models behind the plugin ABI, composed as for a config.
+/// Returns the problem with models behind the plugin ABI, as a config would create it.
 Problem PluginProblem() {
   Problem problem = testing::DepthFilter();
   problem.motions[0].model =
@@ -174,8 +174,8 @@ Problem PluginProblem() {
   return problem;
 }
 
-/// Makes a contender whose chunk takes about 0.4 ms. Appends to `depths` its depth after one
-/// period.
+/// Returns a contender whose chunk takes about 0.4 ms. Appends the depth of its filter after one
+/// period to `depths`.
 template <class Filter>
 Contender MakeContender(const std::string& name, std::shared_ptr<Filter> filter,
                         const TargetMeasurements& target, std::vector<double>& depths) {
@@ -229,7 +229,7 @@ int Main(int rounds) {
   // updates linearise at different points.
   for (std::size_t i = 0; i < contenders.size(); ++i) {
     if (std::abs(depths[i] - depths[0]) < 1e-3) continue;
-    std::fprintf(stderr, "error: %s ends at a depth of %.9f m, the baseline at %.9f m\n",
+    std::fprintf(stderr, "error: the final depth of %s is %.9f m, that of the baseline is %.9f m\n",
                  contenders[i].name.c_str(), depths[i], depths[0]);
     return 1;
   }
@@ -251,7 +251,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Time of a step of a small filter, relative to hand-written code and other libraries."};
   int rounds = 300;
-  app.add_option("--rounds", rounds, "Chunks of 0.4 ms for each contender")
+  app.add_option("--rounds", rounds, "Number of chunks of 0.4 ms for each contender")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-/// Includes all headers for estimation: problems, filters, out-of-sequence measurements, smoother.
+/// Includes the public headers for estimation: problems, filters, rollback and the RTS smoother.
 #include "alidade/base/timestamp.h"
 #include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"

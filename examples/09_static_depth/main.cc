@@ -20,7 +20,7 @@ using namespace alidade;  // NOLINT(google-build-using-namespace): a program, no
 // Indices of the blocks, in the order of the motion models.
 using DepthFilter = StaticEkf<ConstantVelocity<1, false>, Constant<1>>;
 constexpr int kDepth = 0, kRate = 1, kInverseDistance = 2;
-constexpr double kGate = 15.1367;  // chi-square with 1 degree of freedom: 99.99 % pass
+constexpr double kGate = 15.1367;  // 99.99 % quantile of chi-square with 1 degree of freedom
 
 }  // namespace
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-/// The first 2.5 s of the data of example 05, seed 1, rounded.
+/// Data of example 05 with seed 1 for the first 2.5 s. The values are rounded.
 namespace static_depth {
 
 struct Row {
-  double disparity_px;   ///< 0 if stereo is blind
+  double disparity_px;   ///< 0 if stereo does not measure
   double inverse_scale;  ///< template width / apparent width, both in px
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A filter in your own program. It pushes measurements as they arrive, and predicts the state.
-// The program reads lines `t_s stream value` from standard input.
+// Shows a filter in your own program. The program reads lines `t_s stream value` from standard
+// input. It passes each measurement to the filter when it arrives, and predicts the state.
 #include <alidade/experiment/experiment.h>
 #include <alidade/experiment/make_filter.h>
 

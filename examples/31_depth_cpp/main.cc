@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The filter of example 05 in C++, without a config and without plugins. A stereo camera is blind
-// below 0.25 m, but the apparent size of the target still changes there.
+// The filter of example 05 in C++, without a config and without plugins. A stereo camera does not
+// measure depths below 0.25 m, but the apparent size of the target still changes with the depth.
 #include <alidade/estimation.h>
 #include <alidade/motion_models/constant.h>
 #include <alidade/motion_models/constant_velocity.h>

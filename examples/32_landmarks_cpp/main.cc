@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A filter with models of its own and with landmarks: a robot drives with odometry, measures the
-// points around it, and maps these points.
+// A filter with landmarks and with models that this program defines. A robot drives with odometry,
+// measures the points around it, and maps these points.
 #include <alidade/estimation.h>
 
 #include <array>
@@ -13,15 +13,15 @@ using alidade::Angle;
 using alidade::Quantity;
 using alidade::Vec;
 
-/// Robot in the plane whose input is its measured speed v and turn rate r, both with noise w:
+/// Robot in the plane. Its input is the measured speed v and turn rate r. The input has noise w:
 ///
 ///   p' = p + (v + w_v) dt (cos a, sin a),   heading' = heading + (r + w_r) dt,
 ///   a = heading + (r + w_r) dt / 2
 struct Robot : alidade::Motion<2, Vec<2>, Angle> {
-  static constexpr std::array kBlocks{Quantity{"position", "m", "in the world", "x,y"},
-                                      Quantity{"heading", "rad", "from the x axis"}};
+  static constexpr std::array kBlocks{Quantity{"position", "m", "position in the world", "x,y"},
+                                      Quantity{"heading", "rad", "angle from the x axis"}};
   using Input = Vec<2>;
-  static constexpr Quantity kInput{"odometry", "", "speed, m/s, turn rate, rad/s", "v,r"};
+  static constexpr Quantity kInput{"odometry", "", "speed in m/s and turn rate in rad/s", "v,r"};
 
   alidade::NoiseKind noise_kind() const { return alidade::NoiseKind::kDiscrete; }
   template <class T>
@@ -40,12 +40,12 @@ struct Robot : alidade::Motion<2, Vec<2>, Angle> {
   }
 };
 
-/// Measures a point of the world in the frame of the robot: x ahead, y to the left, z up.
+/// Measures the position of a point in the frame of the robot: x ahead, y to the left, z up.
 struct PointInRobot : alidade::Sensor<Vec<3>, Vec<2>, Angle, Vec<3>> {
   static constexpr std::array kRoles{
-      Quantity{"position", "m", "of the robot", "x,y"}, Quantity{"heading", "rad"},
-      Quantity{"landmark", "m", "the point in the world", "x,y,z", ALIDADE_ROLE_LANDMARK}};
-  static constexpr Quantity kMeasurement{"point", "m", "in the robot", "x,y,z"};
+      Quantity{"position", "m", "position of the robot", "x,y"}, Quantity{"heading", "rad"},
+      Quantity{"landmark", "m", "position in the world", "x,y,z", ALIDADE_ROLE_LANDMARK}};
+  static constexpr Quantity kMeasurement{"point", "m", "position relative to the robot", "x,y,z"};
   static constexpr int kInitialises = 2;
 
   template <class T>

@@ -47,8 +47,8 @@ class CalibrationFile {
     root.RejectUnread();
   }
 
-  /// Returns the text of the file, in which blanks replace the directive and the tags of OpenCV.
-  /// The directive and the tags are not YAML.
+  /// Returns the text of the file. Replaces the directive and the tags of OpenCV, which are not
+  /// YAML, by blanks.
   static std::string PlainYaml(const std::filesystem::path& file) {
     std::string text = internal::ReadFile(file, [&](ExitCode code, int error) {
       throw Error(code, ErrorLine({file.string()}, {}, std::strerror(error)));
@@ -65,7 +65,7 @@ class CalibrationFile {
     const Node matrix = root.At("camera_matrix").At("data");
     const std::vector<double> k = matrix.Numbers(9);
     if (k[1] != 0.0 || k[3] != 0.0 || k[6] != 0.0 || k[7] != 0.0 || k[8] != 1.0) {
-      matrix.Fail("not a camera matrix with zero skew", "[fx, 0, cx, 0, fy, cy, 0, 0, 1]");
+      matrix.Fail("this is not a camera matrix without skew", "[fx, 0, cx, 0, fy, cy, 0, 0, 1]");
     }
     SetIntrinsics({k[0], k[4], k[2], k[5]}, matrix.place());
     Copy(root.At("image_width"), "camera.width");
@@ -77,19 +77,22 @@ class CalibrationFile {
 
   void ReadKalibr(const Node& camera, const char* distortion) {
     const Node model = camera.At("camera_model");
-    if (model.Text() != "pinhole") model.Fail("'" + model.Text() + "'", "pinhole");
+    if (model.Text() != "pinhole") {
+      model.Fail("unknown camera model '" + model.Text() + "'", "pinhole");
+    }
     const Node intrinsics = camera.At("intrinsics"), size = camera.At("resolution");
     const std::vector<double> k = intrinsics.Numbers(4);
     SetIntrinsics({k[0], k[1], k[2], k[3]}, intrinsics.place());
     const std::vector<Node> sides = size.Items();
-    if (sides.size() != 2) size.Fail("not two numbers", "[width, height], px");
+    if (sides.size() != 2) size.Fail("the list must have two numbers", "[width, height], px");
     Copy(sides[0], "camera.width");
     Copy(sides[1], "camera.height");
     const Node kind = camera.At("distortion_model");
     if (kind.Text() == "none") return Set("camera.model", "pinhole", kind.place());
     const bool equidistant = kind.Text() == "equidistant";
     if (!equidistant && kind.Text() != "radtan" && kind.Text() != "radial-tangential") {
-      kind.Fail("'" + kind.Text() + "'", "radtan, radial-tangential, equidistant or none");
+      kind.Fail("unknown distortion model '" + kind.Text() + "'",
+                "radtan, radial-tangential, equidistant or none");
     }
     SetDistortion(camera.At(distortion), equidistant);
   }
@@ -108,8 +111,8 @@ class CalibrationFile {
     const std::size_t max_count = equidistant ? 4 : 5;
     for (std::size_t i = max_count; i < values.size(); ++i) {
       if (values[i] != 0.0) {
-        node.Fail("a coefficient beyond the first " + std::to_string(max_count) + " that is not 0",
-                  equidistant ? "k1, k2, k3, k4" : "k1, k2, p1, p2, k3");
+        node.Fail("a coefficient after the first " + std::to_string(max_count) + " is not 0",
+                  equidistant ? "only k1, k2, k3, k4" : "only k1, k2, p1, p2, k3");
       }
     }
     values.resize(max_count, 0.0);
@@ -131,7 +134,7 @@ class CalibrationFile {
   void ReadIntrinsics(const Node& root) {
     const auto intrinsics = root.Find("intrinsics_px");
     if (!intrinsics)
-      root.Fail("no calibration of a camera",
+      root.Fail("the file contains no calibration of a camera",
                 "'camera', 'intrinsics_px', or a file of OpenCV, ROS, Kalibr or EuRoC");
     for (const char* key : {"fx", "fy", "cx", "cy"}) {
       Copy(intrinsics->At(key), std::string("camera.") + key);

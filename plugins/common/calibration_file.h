@@ -11,11 +11,11 @@ namespace alidade {
 /// use. The file has one of these forms:
 ///
 ///   in the file                                       key
-///   camera: {width, height, fx, fy, cx, cy, ...}      camera.*, as `alidade simulate` writes it
+///   camera: {width, height, fx, fy, cx, cy, ...}      camera.*; written by `alidade simulate`
 ///
 ///   image: {width, height}                            camera.width, camera.height
-///   intrinsics_px: {fx, fy, cx, cy}                   camera.fx, ..., of a pinhole camera
-///   baseline_m                                        camera.baseline_m, of a rectified pair
+///   intrinsics_px: {fx, fy, cx, cy}                   camera.fx, ...; pinhole camera
+///   baseline_m                                        camera.baseline_m; rectified pair
 ///   vehicle_from_cam: {position_m, quaternion}        vehicle_from_cam.position, .orientation
 ///
 ///   camera_matrix, distortion_coefficients: {data}, image_width, image_height, [distortion_model:
@@ -25,10 +25,10 @@ namespace alidade {
 ///   distortion_coeffs, resolution}                           Kalibr
 ///
 ///   camera_model: pinhole, intrinsics, distortion_model: radial-tangential or equidistant,
-///   distortion_coefficients, resolution                      sensor of EuRoC
+///   distortion_coefficients, resolution                      EuRoC
 ///
-/// From the last three forms, only the values of the camera itself are read. The key `sigma_px`,
-/// which is for `alidade bundle`, is not read from any form.
+/// In the last three forms, only the keys listed here are read. Each form may also contain the key
+/// `sigma_px`, which only `alidade bundle` reads.
 ///
 /// Errors       kBadData with file, line and column; kInputMissing.
 Config ReadCalibrationFile(const std::filesystem::path& file);

@@ -13,18 +13,18 @@ TimestampRows::TimestampRows(const std::filesystem::path& path, const Place& pla
 
 bool TimestampRows::Next(std::int64_t& frame, Timestamp& timestamp) {
   if (!rows_.Next()) {
-    if (line_ == 0) rows_.FailLine("no rows", "a row `frame,t_s` for each frame");
+    if (line_ == 0) rows_.FailLine("the file contains no rows", "a row `frame,t_s` for each frame");
     return false;
   }
   if (line_ == 0 && rows_.text(0) == "frame" && !rows_.Next()) {
-    rows_.FailLine("no rows", "a row `frame,t_s` for each frame");
+    rows_.FailLine("the file contains no rows", "a row `frame,t_s` for each frame");
   }
   rows_.ExpectColumns(2, "frame,t_s");
   frame = rows_.Index(0, "frame");
   timestamp = rows_.Time(1, "t_s");
   const std::string previous = " line " + std::to_string(line_);
   if (line_ > 0 && frame <= frame_) {
-    rows_.FailCell(0, "frame", "is not larger than in" + previous, "increasing frames");
+    rows_.FailCell(0, "frame", "is not larger than in" + previous, "increasing frame numbers");
   }
   if (line_ > 0 && timestamp <= timestamp_) {
     rows_.FailCell(1, "t_s", "is not later than in" + previous, "increasing times");
@@ -38,14 +38,14 @@ bool TimestampRows::Next(std::int64_t& frame, Timestamp& timestamp) {
 OdometryRows::OdometryRows(const std::filesystem::path& path, const Place& place,
                            const std::string& key)
     : rows_(path, place, key) {
-  if (!rows_.Next()) rows_.FailLine("no header line", kHeader);
+  if (!rows_.Next()) rows_.FailLine("the header line is missing", kHeader);
   columns_ = rows_.size();
   for (std::size_t k = 0; k < place_.size(); ++k) {
     for (std::size_t i = 0; i < columns_; ++i) {
       if (rows_.text(i) == kNames[k]) place_[k] = i;
     }
     if (place_[k] == kNone) {
-      rows_.FailLine(std::string("no column '") + kNames[k] + "'", kHeader);
+      rows_.FailLine(std::string("there is no column '") + kNames[k] + "'", kHeader);
     }
   }
   Advance();
@@ -74,7 +74,7 @@ void OdometryRows::Advance() {
   if (!first && frame <= next_frame_) {
     rows_.FailCell(place_[0], kNames[0],
                    "is not larger than in line " + std::to_string(line_before),
-                   "increasing frames");
+                   "increasing frame numbers");
   }
   next_frame_ = frame;
   for (std::size_t k = 0; k < next_.size(); ++k) {

@@ -9,10 +9,11 @@
 
 #include "alidade/io/number_rows.h"
 
-/// Readers of the files next to a file of tracks. These files are read together with the tracks.
+/// Readers of the files next to a file of tracks. A reader reads its file frame by frame, in step
+/// with the tracks.
 namespace alidade {
 
-/// Reader of rows `frame,t_s`, one row for each frame. Both columns increase. A header line is
+/// Reader of rows `frame,t_s`, one row for each frame. Both columns must increase. A header line is
 /// optional.
 class TimestampRows {
  public:
@@ -32,16 +33,16 @@ class TimestampRows {
 
 using OdometryValues = std::array<double, 6>;  ///< vx vy vz in m/s, wx wy wz in rad/s
 
-/// Reader of rows with a frame and six velocities. A header names the columns; they can have any
+/// Reader of rows with a frame and six velocities. A header names the columns, which can be in any
 /// order.
 class OdometryRows {
  public:
   OdometryRows(const std::filesystem::path& path, const Place& place, const std::string& key);
 
-  /// Returns the row of `frame`, or nullopt if the file has no row of this frame. `frame` may not
+  /// Returns the row of `frame`, or nullopt if the file has no row for this frame. `frame` must not
   /// decrease between calls.
   std::optional<OdometryValues> At(std::int64_t frame);
-  /// Returns the first row after the frame of the last call of At.
+  /// Returns the first row after the frame that was last passed to At().
   std::optional<OdometryValues> Following() const;
 
  private:
@@ -64,7 +65,7 @@ class OdometryRows {
 /// Pose of a camera, world_from_cam.
 struct Pose {
   std::array<double, 3> position;
-  std::array<double, 4> orientation;  ///< w x y z
+  std::array<double, 4> orientation;  ///< quaternion w x y z
 
   /// Returns the pose in the frame of camera `c`: c_from_cam = world_from_c^-1 world_from_cam.
   Pose In(const Pose& c) const;
@@ -77,7 +78,7 @@ class TumRows {
   TumRows(const std::filesystem::path& path, const Place& place, const std::string& key);
 
   /// Returns the pose nearest in time to `timestamp`, or nullopt if no pose is within `tolerance`.
-  /// If two poses are equally near, returns the earlier one. `timestamp` may not decrease between
+  /// If two poses are equally near, returns the earlier one. `timestamp` must not decrease between
   /// calls.
   std::optional<Pose> At(Timestamp timestamp, Timestamp tolerance);
 
@@ -88,7 +89,7 @@ class TumRows {
   bool has_next_ = false;
   Timestamp timestamp_ = 0;  ///< time of the last row that was read
   Pose pose_{};
-  Timestamp nearest_timestamp_ = 0;  ///< time of the row before the last one
+  Timestamp nearest_timestamp_ = 0;  ///< time of the pose nearest_
   std::optional<Pose> nearest_;
 };
 

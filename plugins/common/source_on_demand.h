@@ -9,17 +9,17 @@
 
 namespace alidade {
 
-/// Creates the source of the plugin `name`, which is in a folder of its own because it links OpenCV
-/// and loads slowly. The plugin is loaded by this call. Errors: kPlugin, kNotTrusted, those of the
-/// source.
+/// Creates the source of the plugin `name`. This call loads the plugin, which links OpenCV and
+/// loads slowly. The plugin is in a separate folder, so that it is not loaded with other plugins.
+/// Errors: kPlugin, kNotTrusted, and those of the source.
 inline std::unique_ptr<Source> CreateOnDemand(const std::string& name,
                                               const SourceArguments& arguments) {
   const void* const factory = internal::FactoryOnDemand(
       kSourceKind, name, {},
       ErrorLine(arguments.entry.place(), arguments.entry.path(),
                 "this build of alidade cannot read images",
-                "a build with OpenCV: apt-get install libopencv-dev, then configure and build "
-                "again"));
+                "a build with OpenCV: run 'apt-get install libopencv-dev', then configure and "
+                "build again"));
   return static_cast<const SourceEntry*>(factory)->create(arguments);
 }
 

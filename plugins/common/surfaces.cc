@@ -106,7 +106,8 @@ class SurfaceView {
     return hit;
   }
 
-  /// Returns the mean brightness of 4 x 4 rays through a pixel, for pixels on an edge.
+  /// Returns the mean brightness of 4 x 4 rays through a pixel. Used for pixels at the edge of a
+  /// surface.
   double MeanBrightness(int u, int v) const {
     constexpr double kOffsets[] = {-0.375, -0.125, 0.125, 0.375};
     double sum = 0.0;
@@ -119,7 +120,7 @@ class SurfaceView {
  private:
   struct Plane {
     Eigen::Vector3d normal, right, down;  ///< unit normal; edges divided by their squared length
-    double distance, width, height;       ///< distance of the camera, signed, m; sides, m
+    double distance, width, height;       ///< signed distance from the camera, m; sides, m
   };
   const std::vector<Rectangle>& surfaces_;
   const Camera& camera_;

@@ -15,9 +15,9 @@ namespace alidade {
 /// Rectangle that looks the same from both sides. The largest structures of its texture have the
 /// size `grain_m`.
 struct Rectangle {
-  Eigen::Vector3d corner, right, down;  ///< m, world: a corner, and the two edges from it
+  Eigen::Vector3d corner, right, down;  ///< a corner, and the two edges from this corner; world, m
   double grain_m;
-  std::uint64_t texture;  ///< number of the texture; equal numbers give equal textures
+  std::uint64_t texture;  ///< number that determines the texture
 };
 
 /// Renders the image of a camera at `position`, `orientation` (world_from_cam, w x y z), with grey

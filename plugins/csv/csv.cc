@@ -35,7 +35,9 @@ class CsvSource : public Source {
 
   bool Next(SourceFrame& frame) override {
     if (!has_row_ && !ReadRow()) {
-      if (rows_ == 0) Fail(Place{reader_.name()}, {}, "no data rows", "a row below the header");
+      if (rows_ == 0) {
+        Fail(Place{reader_.name()}, {}, "the table has no rows", "a row below the header");
+      }
       return false;
     }
     frame.timestamp = timestamp_;
@@ -60,8 +62,8 @@ class CsvSource : public Source {
     return true;
   }
 
-  /// Appends the measurements of the row to `frame`, of which the first `count` are already filled.
-  /// Increases `count`.
+  /// Appends the measurements of the row to `frame`. The first `count` measurements of `frame` are
+  /// already set. Increases `count`.
   void AppendRow(SourceFrame& frame, std::size_t& count) {
     for (std::size_t i = 0; i < layout_.streams.size(); ++i) {
       if (count == frame.measurements.size()) frame.measurements.emplace_back();
@@ -90,13 +92,13 @@ class CsvSource : public Source {
   }
   static std::filesystem::path Path(const Node& node, const std::filesystem::path& folder) {
     const std::filesystem::path path = node.Text();
-    if (path.empty()) node.Fail("no path", "a file, or '-' for standard input");
+    if (path.empty()) node.Fail("the path is empty", "a file, or '-' for standard input");
     return path == "-" ? path : folder / path;
   }
 
-  /// Reads the next line that is neither a comment nor blank. A blank line is also a row in two
-  /// cases: the cell of a single column may be missing, or the number of the row determines the
-  /// time.
+  /// Reads the next line that is neither a comment nor blank. In two cases a blank line is a row:
+  /// if the table has a single column, whose cell may be missing, or if the row number determines
+  /// the time.
   bool NextRow() {
     while (reader_.Next(line_)) {
       if (line_.starts_with('#')) {
@@ -123,13 +125,14 @@ class CsvSource : public Source {
 
   void ReadHeader() {
     if (!NextRow())
-      Fail(Place{reader_.name()}, {}, "no header line", "a line that names the columns");
+      Fail(Place{reader_.name()}, {}, "the header line is missing",
+           "a line that names the columns");
     header_line_ = last_line_ = reader_.number();
     constexpr std::string_view kGzip = "\x1F\x8B";
     if (line_.starts_with(kGzip) || line_.find('\0') != line_.npos) {
-      Fail(Place{reader_.name(), header_line_, 1}, {}, "not a text file",
-           "a table; for a compressed one use a pipe: zcat FILE | alidade run CONFIG --set "
-           "source.path=-");
+      Fail(Place{reader_.name(), header_line_, 1}, {}, "this is not a text file",
+           "a table as text; to read a compressed table, use a pipe: zcat FILE | alidade run "
+           "CONFIG --set source.path=-");
     }
     Split();
     std::vector<std::string> names;
@@ -141,8 +144,9 @@ class CsvSource : public Source {
   void CountRows() {
     if (any_order_) {
       layout_.blind_after_node->Fail(
-          "counts the rows in the order of the file, but 'out_of_sequence.policy' reorders them",
-          "'out_of_sequence.policy: reject', for a file in the order of time");
+          "this key counts rows in the order of the file, but 'out_of_sequence.policy' reorders "
+          "them",
+          "'out_of_sequence.policy: reject', which requires a file in the order of time");
     }
     if (!reader_.is_regular()) {
       layout_.blind_after_node->Fail(
@@ -166,7 +170,8 @@ class CsvSource : public Source {
     const bool is_too_short = cells_.size() < names_.size();
     const std::size_t column = is_too_short ? line_.size() : Column(cells_[names_.size()]) - 1;
     Fail(Place{reader_.name(), reader_.number(), static_cast<int>(column) + 1}, {},
-         (is_too_short && reader_.is_unterminated() ? "the last line is cut short: " : "") +
+         (is_too_short && reader_.is_unterminated() ? "the last line is cut short: it has "
+                                                    : "the line has ") +
              count(cells_.size()),
          count(names_.size()) + ", as in line " + std::to_string(header_line_));
   }
@@ -175,8 +180,8 @@ class CsvSource : public Source {
     return std::find(layout_.missing.begin(), layout_.missing.end(), cell) != layout_.missing.end();
   }
 
-  /// Reads the values of a field. Returns false, and no values, if one of its cells marks a missing
-  /// value.
+  /// Reads the values of a field. Returns false and clears `values` if a cell of the field marks a
+  /// missing value.
   bool ReadField(const CsvField& field, std::vector<double>& values) const {
     values.clear();
     for (const CsvColumn& column : field.columns) {
@@ -184,8 +189,8 @@ class CsvSource : public Source {
       const double x = ReadNumber(column);
       const double value = field.reciprocal ? field.gain / x : field.gain * x;
       if (!std::isfinite(value)) {
-        FailCell(column,
-                 field.reciprocal ? "has no finite reciprocal" : "is too large for the gain");
+        FailCell(column, field.reciprocal ? "has no finite reciprocal"
+                                          : "is too large to be multiplied by the gain");
       }
       values.push_back(value);
     }
@@ -193,7 +198,8 @@ class CsvSource : public Source {
     return !values.empty();
   }
 
-  /// Reads the known values of a field. Returns false if one of their cells marks a missing value.
+  /// Reads the known values of a field. Returns false if a cell of these values marks a missing
+  /// value.
   bool ReadKnown(const CsvField& field, std::vector<double>& known) const {
     known.clear();
     for (const CsvColumn& column : field.known) {
@@ -268,8 +274,8 @@ class CsvSource : public Source {
 
   std::string_view line_;
   std::vector<std::string_view> cells_;
-  bool has_row_ = false;     ///< true if a row was read that is not in a frame yet
-  Timestamp timestamp_ = 0;  ///< time of the row that was read last
+  bool has_row_ = false;     ///< true if the last row that was read is not in a frame yet
+  Timestamp timestamp_ = 0;  ///< time of the last row that was read
   std::int64_t rows_ = 0;    ///< number of rows in frames so far
   Timestamp last_timestamp_ = 0;
   int last_line_ = 0;

@@ -35,7 +35,10 @@ std::optional<Config> CsvCalibration::Get() const {
     }
     const auto first = std::ranges::find(entries_, entry.key, &Entry::key);
     if (&*first != &entry) {
-      Fail(entry, "occurs twice, first in line " + std::to_string(first->place.line), "one value");
+      Fail(entry,
+           "there is a second value; the first value is in line " +
+               std::to_string(first->place.line),
+           "one value");
     }
     const std::string origin = ToString(entry.place);
     config.Set("calibration." + entry.key, entry.text, origin);

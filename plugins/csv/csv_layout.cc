@@ -17,7 +17,9 @@ CsvField ReadField(const std::string& name, const Node& node, bool has_known) {
     if (const auto reciprocal = node.Find("reciprocal")) field.reciprocal = reciprocal->Flag();
     if (const auto gain = node.Find("gain")) {
       field.gain = gain->Number();
-      if (field.gain == 0.0) gain->Fail("a gain of 0 erases the column", "a number other than 0");
+      if (field.gain == 0.0) {
+        gain->Fail("a gain of 0 sets all values to 0", "a number other than 0");
+      }
     }
     if (const auto known = has_known ? node.Find("known") : std::nullopt) {
       for (const Node& column : known->ItemsOrOne()) field.known.push_back({column.Text(), column});
@@ -25,7 +27,9 @@ CsvField ReadField(const std::string& name, const Node& node, bool has_known) {
     node.RejectUnread();
   }
   for (const Node& column : columns.ItemsOrOne()) field.columns.push_back({column.Text(), column});
-  if (field.columns.empty()) columns.Fail("no columns", "the name of a column, or a list of names");
+  if (field.columns.empty()) {
+    columns.Fail("the list is empty", "the name of a column, or a list of names");
+  }
   field.info.size = static_cast<int>(field.columns.size());
   field.info.known = static_cast<int>(field.known.size());
   return field;
@@ -41,7 +45,7 @@ void ReadTime(const Node& entry, CsvLayout& layout) {
   const std::optional<Node> time = entry.Find("time");
   const std::optional<Node> rate = entry.Find("rate_hz");
   if (rate) {
-    if (time) rate->Fail("'time' and 'rate_hz' are both given", "one of them");
+    if (time) rate->Fail("'time' and 'rate_hz' are both given", "only one of these keys");
     layout.rate_hz = rate->Number(1e-3, 1e9);
     return;
   }
@@ -60,17 +64,17 @@ char ReadSeparator(const Node& node) {
   const std::string text = node.Text();
   const bool part_of_number = text.find_first_of("+-.#\"\r\n0123456789eE") != std::string::npos;
   if (text.size() != 1 || part_of_number) {
-    node.Fail("not a separator",
+    node.Fail("this text is not a valid separator",
               "one character that does not occur in numbers, such as ';' or \"\\t\"");
   }
   return text[0];
 }
 
-/// Reads a text that marks a missing value if a cell contains it.
+/// Reads the text of a cell that marks a missing value.
 std::string ReadMissing(const Node& word) {
   const std::string text = word.Text();
   if (text == ".nan" || text == ".NaN" || text == ".NAN") {
-    word.Fail("'" + text + "' is not the text of a cell", "the text as it is in the table",
+    word.Fail("'" + text + "' cannot be the text of a cell", "the text that the table contains",
               text.substr(1));
   }
   return text;
@@ -80,7 +84,9 @@ void ReadBlind(const Node& entry, CsvLayout& layout) {
   const std::optional<Node> after = entry.Find("blind_after");
   const std::optional<Node> blind = entry.Find("blind");
   if (!after) {
-    if (blind) blind->Fail("has no effect without 'blind_after'", "'blind_after' as well");
+    if (blind) {
+      blind->Fail("this key has no effect without 'blind_after'", "the key 'blind_after', too");
+    }
     return;
   }
   layout.blind_after_node = after;
@@ -93,14 +99,14 @@ void ReadBlind(const Node& entry, CsvLayout& layout) {
     if (found == names.end()) {
       std::string known;
       for (const std::string& name : names) known += (known.empty() ? "one of " : ", ") + name;
-      item.Fail("no stream '" + item.Text() + "'", known, Nearest(item.Text(), names));
+      item.Fail("there is no stream '" + item.Text() + "'", known, Nearest(item.Text(), names));
     }
     layout.streams[static_cast<std::size_t>(found - names.begin())].goes_blind = true;
   }
 }
 
-/// Returns the remedy `, or 'source.separator: ";"'` if the header has one name that appears to
-/// contain several, else "".
+/// Returns the remedy `, or 'source.separator: ";"'` if the header has a single name that contains
+/// another separator. Otherwise returns "".
 std::string OtherSeparator(const std::vector<std::string>& names) {
   if (names.size() != 1) return {};
   for (const char separator : {';', '\t', '|', ',', ' '}) {
@@ -111,7 +117,7 @@ std::string OtherSeparator(const std::vector<std::string>& names) {
   return {};
 }
 
-/// Finds a column in the header `names` of `file`.
+/// Finds a column in `names`, the header of `file`.
 void Resolve(const std::vector<std::string>& names, const std::string& file, CsvColumn& column) {
   constexpr std::size_t kListed = 20;
   const auto found = std::find(names.begin(), names.end(), column.name);
@@ -122,11 +128,11 @@ void Resolve(const std::vector<std::string>& names, const std::string& file, Csv
     }
     if (names.size() > kListed) expected += ", ...";
     const std::string remedy = OtherSeparator(names);
-    column.node.Fail("no column '" + column.name + "' in " + file, expected + remedy,
+    column.node.Fail("there is no column '" + column.name + "' in " + file, expected + remedy,
                      remedy.empty() ? cell::PrintableStart(Nearest(column.name, names)) : "");
   }
   if (std::find(found + 1, names.end(), column.name) != names.end()) {
-    column.node.Fail(file + " has two columns '" + column.name + "'", "one");
+    column.node.Fail(file + " has two columns '" + column.name + "'", "one column with this name");
   }
   column.index = static_cast<std::size_t>(found - names.begin());
 }
@@ -142,7 +148,7 @@ CsvLayout ReadCsvLayout(const Node& entry) {
   const Node streams = entry.At("streams", "csv");
   layout.streams = ReadFields(streams, true);
   if (layout.streams.empty())
-    streams.Fail("no streams", "a map, such as 'disparity: disparity_px'");
+    streams.Fail("the map is empty", "a map such as 'disparity: disparity_px'");
   if (const auto truth = entry.Find("truth")) layout.truths = ReadFields(*truth, false);
   ReadTime(entry, layout);
   if (const auto separator = entry.Find("separator")) {

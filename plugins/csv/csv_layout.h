@@ -14,25 +14,26 @@ namespace alidade {
 /// Column that the config names, with its index in the header.
 struct CsvColumn {
   std::string name;
-  Node node;  ///< place in the config
+  Node node;  ///< node of the config that names the column
   std::size_t index = 0;
 };
 
-/// Stream or truth value. It has one value for each of its columns: v = gain x, or v = gain / x.
+/// Stream or true value. Each of its columns x provides one number: gain x, or gain / x if
+/// `reciprocal` is true.
 struct CsvField {
   StreamInfo info;
   std::vector<CsvColumn> columns;
   std::vector<CsvColumn> known;  ///< columns of the known numbers of a measurement
   double gain = 1.0;
   bool reciprocal = false;
-  bool goes_blind = false;  ///< true if it is dropped after `blind_after`
+  bool goes_blind = false;  ///< true if the stream is dropped after `blind_after`
 };
 
 /// Layout of a table according to the config: see kCsvKeys in csv.h.
 struct CsvLayout {
   std::optional<CsvColumn> time;  ///< empty if rate_hz determines the times
-  std::size_t time_digits = 9;    ///< power of ten of the unit of time in ns: 9 for s
-  bool time_repeats = false;      ///< true if consecutive rows with one time are one frame
+  std::size_t time_digits = 9;    ///< the unit of time is 10^time_digits ns: 9 for s
+  bool time_repeats = false;      ///< true if rows with the same time form one frame
   double rate_hz = 0.0;
   std::vector<CsvField> streams, truths;
   char separator = ',';

@@ -2,5 +2,5 @@
 #include "alidade/experiment/source_plugin.h"
 #include "csv.h"
 
-ALIDADE_SOURCE_PLUGIN({"csv", "columns of a table, from a file or a pipe", alidade::kCsvKeys,
-                       &alidade::CreateCsv})
+ALIDADE_SOURCE_PLUGIN({"csv", "measurements and truth from a table: a file or a pipe",
+                       alidade::kCsvKeys, &alidade::CreateCsv})

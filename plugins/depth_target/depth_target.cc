@@ -29,7 +29,7 @@ class DepthTarget : public Source {
     frequency_hz_ = p.NonNegative("frequency_hz", "Hz", "frequency of the motion", 0.4);
     step_s_ = 1.0 / p.Number("rate_hz", "Hz", "samples per second", {1e-6, 1e6}, 1.0 / 0.033);
     const double duration_s =
-        p.Number("duration_s", "s", "upper limit of the time of the last sample", {0.0, 1e9}, 5.0);
+        p.Number("duration_s", "s", "maximum time of the last sample", {0.0, 1e9}, 5.0);
     focal_px_ = p.Positive("focal_px", "px", "rectified focal length", 400.0);
     baseline_m_ = p.Positive("baseline_m", "m", "stereo baseline", 0.065);
     bf_px_m_ = focal_px_ * baseline_m_;
@@ -39,13 +39,13 @@ class DepthTarget : public Source {
                         {0.0, 1.0}, 0.0);
     outlier_share_ =
         p.Number("outliers.share", "1",
-                 "probability that a disparity is uniform from 0 to the largest (poor texture)",
+                 "probability that a disparity is wrong: uniform from 0 to the largest one",
                  {0.0, 1.0}, 0.0);
     const double min_range_m =
         p.NonNegative("min_range_m", "m", "minimum depth that stereo measures; 0: no limit", 0.3);
     blind_by_true_depth_ =
         p.Choice("blind_test", {"measured", "true_depth"},
-                 "disparity that is compared with the limit min_range_m: noisy or exact", 0) == 1;
+                 "disparity that is compared with the limit (min_range_m): noisy or exact", 0) == 1;
     const double template_px = p.Positive("template_px", "px", "width of the template", 300.0);
     const double sigma_edge_px =
         p.NonNegative("sigma_edge_px", "px", "noise of an edge of the target, 1 sigma", 1.0);
@@ -54,16 +54,17 @@ class DepthTarget : public Source {
     width_px_ = p.Integer("image.width", "width of the images, px", 16, 1 << 14, 640);
     height_px_ = p.Integer("image.height", "height of the images, px", 16, 1 << 14, 480);
     image_noise_grey_ =
-        p.NonNegative("image.noise_grey", "1", "noise of a pixel, in grey levels of 255", 2.0);
+        p.NonNegative("image.noise_grey", "1", "noise of a pixel, in grey levels (0 to 255)", 2.0);
     wall_m_ =
         p.Positive("image.wall_m", "m", "depth of the wall behind the target", 5.0 * depth_mean_m_);
     if (!(wall_m_ > depth_mean_m_ + amplitude_m_)) {
       p.Fail("image.wall_m",
-             "must be more than depth_mean_m + amplitude_m, or it hides the target");
+             "must exceed depth_mean_m + amplitude_m; otherwise the wall hides the target");
     }
     target_m_ = template_px * template_depth_m_ / focal_px_;
     if (!(amplitude_m_ < depth_mean_m_)) {
-      p.Fail("amplitude_m", "must be less than depth_mean_m, or the target reaches the camera");
+      p.Fail("amplitude_m",
+             "must be less than depth_mean_m; otherwise the target reaches the camera");
     }
     disparity_limit_px_ = min_range_m > 0.0 ? bf_px_m_ / min_range_m : kInfinity;
     relative_sigma_ = 2.0 * sigma_edge_px / template_px;
@@ -83,7 +84,7 @@ class DepthTarget : public Source {
       const Eigen::Vector3d x(side_m, 0.0, 0.0), y(0.0, side_m, 0.0), middle(0.0, 0.0, depth);
       return Rectangle{middle - 0.5 * (x + y), x, y, grain_m, texture};
     };
-    constexpr double kWidest = 20.0;  // size / depth of the wall, which then fills the image
+    constexpr double kWidest = 20.0;  // size / depth of the wall; fills the image
     const std::vector<Rectangle> surfaces = {square(target_m_, depth_m_, 0.25 * target_m_, 0),
                                              square(kWidest * wall_m_, wall_m_, 0.5 * wall_m_, 1)};
     const double eye[3] = {view * baseline_m_, 0.0, 0.0}, level[4] = {1.0, 0.0, 0.0, 0.0};

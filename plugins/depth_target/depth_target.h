@@ -31,11 +31,12 @@ namespace alidade {
 ///            outliers.share      1     -      0      probability of d ~ U(0, F B / (Zm - A))
 ///
 ///   stream                  size  unit  when
-///   disparity               1     px    while stereo measures, if not missing
-///   disparity_all           1     px    if not missing, for a sensor that checks validity
+///   disparity               1     px    stereo measures, and the disparity is not missing
+///   disparity_all           1     px    the disparity is not missing; for a sensor that checks
+///                                       itself whether the disparity is valid
 ///   inverse_scale           1     -     always
-///   inverse_scale_seeing    1     -     while stereo measures; value of inverse_scale
-///   inverse_scale_blind     1     -     while stereo does not measure; value of inverse_scale
+///   inverse_scale_seeing    1     -     stereo measures; same value as inverse_scale
+///   inverse_scale_blind     1     -     stereo does not measure; same value as inverse_scale
 ///
 /// n1 and n2 come from streams 0 and 1 of the seed. Each sample draws both, regardless of the
 /// measurements that are emitted.
@@ -45,13 +46,13 @@ namespace alidade {
 /// image.height pixels and their principal points in the middle. Image noise comes from stream 2 of
 /// the seed; missing and wrong disparities come from stream 3.
 ///
-/// Differences from the notebook: the notebook compares the NOISY disparity with the limit, as
-/// `blind_test: measured` does. This biases the accepted disparities: by -0.85 px if F B / Z is
-/// within 1 px of the limit, by -0.33 px within 3 px (sigma_d 1 px, example 01). `blind_test:
-/// true_depth` compares F B / Z with the limit instead. The text of the notebook has 25 cm and 1
-/// Hz; its code has 30 cm and 0.4 Hz, which are the defaults here. The notebook replaces a blind
-/// disparity by 1e9 px; here it is missing. As here, its scale noise adds the errors of both edges
-/// linearly: 2 sigma_e.
+/// Differences from the notebook of [Ekf2017]: the notebook compares the noisy disparity with the
+/// limit, as `blind_test: measured` does. This biases the accepted disparities: by -0.85 px if F B
+/// / Z is within 1 px of the limit, by -0.33 px within 3 px (sigma_d 1 px, example 01).
+/// `blind_test: true_depth` compares F B / Z with the limit instead. The text of the notebook
+/// states 25 cm and 1 Hz. The code of the notebook uses 30 cm and 0.4 Hz, which are the defaults
+/// here. The notebook replaces a blind disparity by 1e9 px; here it is missing. In both, the noise
+/// of the scale contains the sum of the errors of both edges: 2 sigma_e.
 ///
 /// Defined for  A < Zm; else the configuration is rejected.
 /// Source       [Ekf2017] sec. 2-4.

@@ -4,5 +4,5 @@
 
 ALIDADE_SOURCE_PLUGIN(
     {"depth_target",
-     "simulator: a target oscillates in depth, seen by a stereo pair and a 2D tracker", "",
+     "simulator: a stereo pair and a 2D tracker measure a target that oscillates in depth", "",
      &alidade::CreateDepthTarget})

@@ -39,8 +39,8 @@ inline const char* NameOf(Mark mark) {
   return kNames[static_cast<std::size_t>(mark)];
 }
 
-/// Formats a number with `digits` digits, of which at least one is before the point. With 5 digits:
-/// `0.0123`, `-40.720`.
+/// Formats a number with `digits` digits, at least one of them before the decimal point. Examples
+/// with 5 digits: `0.0123`, `-40.720`.
 inline std::string Digits(double value, int digits) {
   if (!std::isfinite(value)) return "-";
   const double size = std::abs(value);
@@ -80,7 +80,8 @@ class Canvas {
   }
 
   enum class Align { kLeft, kRight, kMiddle };
-  /// Draws a text whose base line starts, or is aligned, at `position`. Characters that OpenCV
+  /// Draws a text with its base line at the height of `position`. `align` determines whether the
+  /// left end, the right end or the middle of the text is at `position`. Characters that OpenCV
   /// cannot draw are shown as '?'.
   void Text(cv::Point2d position, const std::string& text, const cv::Scalar& colour,
             double size = 0.45, Align align = Align::kLeft, int thickness = 1) {
@@ -119,8 +120,8 @@ class Canvas {
     Line({centre.x - reach, centre.y - reach}, {centre.x + reach, centre.y + reach}, colour, 2);
     Line({centre.x - reach, centre.y + reach}, {centre.x + reach, centre.y - reach}, colour, 2);
   }
-  /// Draws the ellipse r' P^-1 r = 9 about a mean. `per_unit` is the length of a unit, px. If
-  /// per_unit.y is negative, y grows upwards.
+  /// Draws the ellipse r' P^-1 r = 9 about a mean. `per_unit` is the length of one unit of the
+  /// plane, px. If per_unit.y is negative, y grows upwards.
   void ThreeSigma(cv::Point2d centre, const PlaneGaussian& gaussian, cv::Point2d per_unit,
                   const cv::Scalar& colour, int thickness = 1) {
     constexpr int kCorners = 40;
@@ -143,7 +144,7 @@ class Canvas {
  private:
   static constexpr int kShift = 4, kFont = cv::FONT_HERSHEY_SIMPLEX;
   static constexpr double kFixedPointScale = 1 << kShift;
-  static constexpr double kDrawableLimit = 1e5;  ///< px; the limit of OpenCV is 2^31 / 2^kShift
+  static constexpr double kDrawableLimit = 1e5;  ///< px; OpenCV has the limit 2^31 / 2^kShift
 
   static bool IsDrawable(cv::Point2d point) {
     return std::abs(point.x) < kDrawableLimit && std::abs(point.y) < kDrawableLimit;

@@ -17,7 +17,7 @@ namespace alidade::draw {
 /// Panel next to the image of a frame, with text and a plot.
 class Panel {
  public:
-  static constexpr int kWidth = 400;  ///< px
+  static constexpr int kWidth = 400;  ///< width of the panel, px
 
   explicit Panel(cv::Mat& image) : canvas_(image), height_(image.rows) {}
 
@@ -115,7 +115,7 @@ class Panel {
   void Elements(const std::vector<ViewElement>& elements) {
     const bool has_truth = std::ranges::any_of(
         elements, [](const ViewElement& element) { return std::isfinite(element.truth); });
-    const double max_letters = has_truth ? 19.0 : 26.0;  // letters that fit into the column
+    const double max_letters = has_truth ? 19.0 : 26.0;  // number of letters that fit the column
     const double value = has_truth ? 234.0 : 290.0, sigma = has_truth ? 308.0 : kRight;
     canvas_.Text({kLeft, y_}, "estimate", kFaint);
     canvas_.Text({sigma, y_}, "sigma", kFaint, 0.45, Canvas::Align::kRight);
@@ -156,8 +156,8 @@ class Panel {
     };
     Inset inset(canvas_, box);
     for (const PlaneGaussian& landmark : map.landmarks) {
-      // Long ellipses are drawn in a paler colour, so that uncertain landmarks do not hide the
-      // others.
+      // Long ellipses are drawn in a paler colour, so that uncertain landmarks do not hide other
+      // landmarks.
       constexpr double kShort = 25.0;  // px
       const double length = 3.0 * scale * std::sqrt(std::max(landmark.xx, landmark.yy));
       const double strength = std::clamp(kShort / length, 0.12, 1.0);
@@ -189,7 +189,8 @@ class Panel {
     Frame(box, map.right + ", " + map.up + " [m]");
     ScaleBar(box, scale);
   }
-  /// Draws a scale bar with a round length of between a fifth and a half of the width.
+  /// Draws a scale bar. Its length is 1, 2 or 5 times a power of ten, and is between a fifth and a
+  /// half of the width of the box.
   void ScaleBar(const cv::Rect2d& box, double px_per_m) {
     double length_m = std::pow(10.0, std::floor(std::log10(0.5 * box.width / px_per_m)));
     for (const double factor : {5.0, 2.0}) {
@@ -227,7 +228,7 @@ class Panel {
     };
     std::vector<cv::Point2d> line, upper, lower, truth;
     for (std::size_t i = 0; i < series.value.size(); ++i) {
-      // The band may be wide at first, and is clipped to the box.
+      // The half width of the band is limited, because it may be very large at first.
       const double reach = std::min(3.0 * series.sigma[i], 10.0 * (high - low));
       line.push_back(to_box(i, series.value[i]));
       upper.push_back(to_box(i, series.value[i] + reach));

@@ -20,7 +20,7 @@ struct Placement {
   static constexpr double kMaxScale = 4.0;
 
   double scale;
-  cv::Size size;  ///< of the scaled image, px
+  cv::Size size;  ///< size of the scaled image, px
   int top;
 
   explicit Placement(const GreyImage& image) {
@@ -30,7 +30,7 @@ struct Placement {
     size = {2 * cvRound(0.5 * scale * width), 2 * cvRound(0.5 * scale * height)};
     top = (kHeight - size.height) / 2;
   }
-  /// Returns the position on the canvas of the centre of pixel (u, v).
+  /// Returns the position of the centre of pixel (u, v) on the canvas.
   cv::Point2d At(const std::array<double, 2>& pixel) const {
     return {(pixel[0] + 0.5) * scale - 0.5, top + (pixel[1] + 0.5) * scale - 0.5};
   }

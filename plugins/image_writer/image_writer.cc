@@ -20,7 +20,7 @@
 namespace alidade {
 namespace {
 
-/// Writer of one PNG for each frame, `000000.png`, `000001.png`, ...
+/// Writer of a PNG file for each frame, `000000.png`, `000001.png`, ...
 class ImageSequenceWriter : public MatWriter {
  public:
   explicit ImageSequenceWriter(const ImageArguments& arguments)
@@ -39,15 +39,15 @@ class ImageSequenceWriter : public MatWriter {
     file.close();
     if (file) return;
     throw Error(ExitCode::kIo,
-                ErrorLine({destination_.shown + '/' + name}, {}, "cannot be written"));
+                ErrorLine({destination_.shown + '/' + name}, {}, "the file cannot be written"));
   }
 
   ImageArguments destination_;
 };
 
-/// Writer of a video, MJPG in AVI. The frame rate follows from the times of the first two frames,
-/// and is rounded to a whole number of at least 1 Hz. A video of a single frame has 30 Hz. Without
-/// an image no video is written. Errors: kCannotCreate, kIo.
+/// Writer of a video with MJPG images in an AVI file. The frame rate follows from the times of the
+/// first two frames, and is rounded to a whole number of at least 1 Hz. A video of a single frame
+/// has 30 Hz. If there is no image, no video is written. Errors: kCannotCreate, kIo.
 class VideoWriter : public MatWriter {
  public:
   explicit VideoWriter(const ImageArguments& arguments)
@@ -58,11 +58,12 @@ class VideoWriter : public MatWriter {
     if (!video_.isOpened()) Open(kSingleFrameRate);
     video_.release();
     if (IsComplete()) return;
-    throw Error(ExitCode::kIo, ErrorLine({destination_.shown}, {}, "cannot be written in full"));
+    throw Error(ExitCode::kIo,
+                ErrorLine({destination_.shown}, {}, "the video cannot be written completely"));
   }
 
  private:
-  static constexpr double kSingleFrameRate = 30.0;  ///< Hz, for a single frame
+  static constexpr double kSingleFrameRate = 30.0;  ///< frame rate of a single frame, Hz
 
   /// All images have the size of the first image.
   void Write(std::int64_t /*number*/, Timestamp timestamp, const cv::Mat& image) override {
@@ -82,8 +83,9 @@ class VideoWriter : public MatWriter {
     const int fourcc = cv::VideoWriter::fourcc('M', 'J', 'P', 'G');
     if (!video_.open(destination_.path.string(), cv::CAP_OPENCV_MJPEG, fourcc, rate_hz,
                      first_.size())) {
-      throw Error(ExitCode::kCannotCreate, ErrorLine({destination_.shown}, {}, "cannot be created",
-                                                     "OpenCV with its Motion JPEG writer"));
+      throw Error(ExitCode::kCannotCreate,
+                  ErrorLine({destination_.shown}, {}, "the video cannot be created",
+                            "OpenCV with its Motion JPEG writer"));
     }
     constexpr double kQuality = 90.0;  // equals quality 95 of cv::imencode
     video_.set(cv::VIDEOWRITER_PROP_QUALITY, kQuality);

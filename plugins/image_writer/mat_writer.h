@@ -12,9 +12,9 @@ namespace alidade {
 
 /// Image writer that draws each frame. A derived class writes or shows the image.
 ///
-/// Points (u, v) are drawn on black as white discs of radius 4 px, placed to 1/256 px. The number
-/// of the frame is drawn at the lower left, in dark grey. The centre of the upper left pixel has u
-/// = v = 0.
+/// Points (u, v) are drawn on a black background, as white discs of radius 4 px. Their positions
+/// are rounded to 1/256 px. The number of the frame is drawn at the lower left, in dark grey. The
+/// centre of the upper left pixel has u = v = 0.
 class MatWriter : public ImageWriter {
  public:
   /// `width` and `height` are the size, px, of the images that are drawn from points.

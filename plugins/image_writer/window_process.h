@@ -23,8 +23,9 @@
 
 namespace alidade {
 
-/// Window in a separate process. The library that draws windows ends a process that has no display,
-/// and needs a thread of its own. Images are sent to the separate process through a socket.
+/// Window in a separate process. The library that draws windows ends its process if there is no
+/// display, and it needs a separate thread. Images are sent to the process of the window through a
+/// socket.
 class WindowProcess {
  public:
   /// Opens the window. Error: kCannotCreate, with `shown` in the message.
@@ -44,9 +45,9 @@ class WindowProcess {
     char opened = 0;
     if (child_ > 0 && ::recv(socket_, &opened, 1, 0) == 1) return;
     End();
-    throw Error(ExitCode::kCannotCreate, ErrorLine({}, shown, "no window can be opened",
-                                                   "a display named by DISPLAY, or --save-video "
-                                                   "FILE.avi, which needs no display"));
+    throw Error(ExitCode::kCannotCreate, ErrorLine({}, shown, "the window cannot be opened",
+                                                   "a display named by DISPLAY; --save-video "
+                                                   "FILE.avi does not need a display"));
   }
   ~WindowProcess() { End(); }
   WindowProcess(const WindowProcess&) = delete;
@@ -92,7 +93,7 @@ class WindowProcess {
     }
     const rlimit no_core{0, 0};
     ::setrlimit(RLIMIT_CORE, &no_core);
-    // Discards messages about fonts and settings.
+    // Discards messages of the library about fonts and settings.
     const int null_device = ::open("/dev/null", O_RDWR);
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
       ::dup2(null_device, stream);

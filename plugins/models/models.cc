@@ -28,13 +28,13 @@ class Models : public Source {
     Params& p = arguments.params;
     const double rate_hz = p.Number("rate_hz", "Hz", "time steps per second", {1e-6, 1e6}, 30.0);
     const double duration_s =
-        p.Number("duration_s", "s", "upper limit of the time of the last step", {0.0, 1e9}, 10.0);
+        p.Number("duration_s", "s", "maximum time of the last step", {0.0, 1e9}, 10.0);
     const Node& entry = arguments.entry;
     for (const char* key : {"start", "initial", "overrides", "sensors", "inputs", "landmarks"}) {
       entry.Declare(key);
     }
     if (arguments.config == nullptr || arguments.host == nullptr) {
-      throw Error(ExitCode::kBadConfig, "source 'models' needs the models of a config");
+      throw Error(ExitCode::kBadConfig, "source 'models' needs a config with models");
     }
     dt_s_ = 1.0 / rate_hz;
     // Allows for rounding if the duration is a multiple of the step.
@@ -74,12 +74,12 @@ class Models : public Source {
   struct Motion {
     const MotionBinding* binding;
     Random noise;
-    int stream = -1;                       ///< stream of its control input
-    const Motion* input_source = nullptr;  ///< motion that draws the input; null: this motion
+    int stream = -1;                       ///< stream of the control input; -1: no input
+    const Motion* input_source = nullptr;  ///< earlier motion with the same input, or null
     std::vector<double> input, mean, amplitude;
     double frequency_hz = 0.0;
-    std::vector<double> w;       ///< current noise
-    bool is_noise_held = false;  ///< true if w is reused: no measurement since its draw
+    std::vector<double> w;       ///< current sample of the noise
+    bool is_noise_held = false;  ///< true if w is reused until the next measurement
   };
   struct Sensor {
     const SensorBinding* binding;
@@ -90,7 +90,7 @@ class Models : public Source {
     int max_per_frame;  ///< maximum number of landmarks per frame
   };
 
-  /// Builds the problem of the truth from the config, merged with `overrides`.
+  /// Builds the problem that defines the truth: that of the config, merged with `overrides`.
   void BuildTruth(const SourceArguments& arguments) {
     const auto overrides = arguments.entry.Find("overrides");
     const Config truth =
@@ -101,7 +101,7 @@ class Models : public Source {
     for (const auto& [key, node] : overrides->Entries()) {
       if (!truth.root().HasUnread(key)) continue;
       node.Fail("the simulator does not read the key '" + key + "'",
-                "`state`, `sensors`, or a key that their models read");
+                "'state', 'sensors', or a key that their models read");
     }
   }
 
@@ -126,12 +126,12 @@ class Models : public Source {
       std::vector<double>& x = x_[static_cast<std::size_t>(prior.block)];
       const std::string name = block.name.substr(block.owner.size() + 1);
       const auto owner = initial_values ? initial_values->Find(block.owner) : std::nullopt;
-      if (owner && !owner->is_map()) owner->Fail("not a map", "{BLOCK: value}");
+      if (owner && !owner->is_map()) owner->Fail("this value is not a map", "{BLOCK: value}");
       if (const auto value = owner ? owner->Find(name) : std::nullopt) {
         constexpr double kLengthTolerance = 1e-3;
         x = value->Numbers(block.geometry().ambient);
         if (DistanceFrom(block.geometry(), x.data()) > kLengthTolerance) {
-          value->Fail("not of unit length",
+          value->Fail("the value does not have unit length",
                       "a unit vector, or a unit quaternion [w, x, y, z], to 1e-3");
         }
         block.geometry().Normalise(x.data());
@@ -160,7 +160,7 @@ class Models : public Source {
 
   void AddMotions(const Node& entry, std::uint64_t seed) {
     const auto inputs = entry.Find("inputs");
-    motions_.reserve(problem_.motions.size());  // motions point to each other
+    motions_.reserve(problem_.motions.size());  // a motion can point to another motion
     for (std::size_t i = 0; i < problem_.motions.size(); ++i) {
       const MotionBinding& binding = problem_.motions[i];
       Motion motion{&binding, Random(seed, 100 + i), -1, nullptr, {}, {}, {}, 0.0, {}, false};
@@ -183,7 +183,7 @@ class Models : public Source {
       if (const auto duplicate = inputs ? inputs->Find(motion.binding->name) : std::nullopt) {
         duplicate->Fail("stream '" + stream + "' is already simulated by the input of '" +
                             earlier.binding->name + "'",
-                        "only the input of '" + earlier.binding->name + "'");
+                        "an entry only for '" + earlier.binding->name + "'");
       }
       motion.stream = earlier.stream;
       motion.input_source = &earlier;
@@ -199,7 +199,7 @@ class Models : public Source {
       if (const auto mean = entry->Find("mean")) motion.mean = mean->Numbers(geometry.ambient);
       if (const auto amplitude = entry->Find("amplitude")) {
         if (!geometry.is_vector()) {
-          amplitude->Fail("the input is not a vector, so it has no amplitude", "only `mean`");
+          amplitude->Fail("the input is not a vector, so it has no amplitude", "only 'mean'");
         }
         motion.amplitude = amplitude->Numbers(geometry.ambient);
         motion.frequency_hz = entry->At("frequency_hz", "an amplitude").Number(0.0, 1e6);
@@ -235,12 +235,12 @@ class Models : public Source {
         if (input) {
           entry.Fail("stream '" + binding.stream + "' of sensor '" + binding.name +
                          "' belongs to a control input",
-                     "a separate stream");
+                     "a different stream for the sensor");
         }
         if (sensor_settings) {
           sensor_settings->Fail(
               "an earlier sensor already simulates the stream '" + binding.stream + "'",
-              "the entry of that sensor");
+              "these settings in the entry of that sensor");
         }
         continue;
       }
@@ -257,7 +257,7 @@ class Models : public Source {
     if (settings) settings->RejectUnread();
   }
 
-  /// Returns the model of the sensor, with landmarks in a representation as points or poses.
+  /// Returns a model of the sensor whose landmarks are points (xyz) or poses.
   static SharedSensor ModelOf(const Node& entry, const SensorBinding& binding) {
     if (!binding.model->has_landmark()) return binding.model;
     entry.At("landmarks", "sensor '" + binding.name + "'");
@@ -284,14 +284,17 @@ class Models : public Source {
   void DrawPoints(const Node& entry, std::uint64_t seed) {
     const auto landmarks = entry.Find("landmarks");
     if (!landmarks) return;
-    if (!problem_.landmarks) landmarks->Fail("no sensor measures landmarks", "no key `landmarks`");
+    if (!problem_.landmarks) {
+      landmarks->Fail("no sensor measures landmarks",
+                      "a sensor of landmarks, or a source without the key 'landmarks'");
+    }
     constexpr int kMaxCount = 1'000'000;
     const auto count =
         static_cast<std::size_t>(landmarks->At("count", "landmarks").Integer(1, kMaxCount));
     const Node box = landmarks->At("box", "landmarks");
     const std::vector<double> low = box.At("min").Numbers(3), high = box.At("max").Numbers(3);
     for (std::size_t k = 0; k < 3; ++k) {
-      if (!(low[k] <= high[k])) box.Fail("min above max", "min <= max in each of x, y, z");
+      if (!(low[k] <= high[k])) box.Fail("'min' exceeds 'max'", "min <= max in each of x, y and z");
     }
     box.RejectUnread();
     landmarks->RejectUnread();
@@ -309,7 +312,7 @@ class Models : public Source {
     for (const KnownLandmark& known : problem_.landmarks->known) {
       if (known.id < 0 || known.id >= static_cast<std::int64_t>(count)) {
         landmarks->At("count").Fail(
-            "no point has the id " + std::to_string(known.id) + " of `landmarks.known`",
+            "no point has the id " + std::to_string(known.id) + " of 'landmarks.known'",
             "a count above the largest id");
       }
       auto& point = points_[static_cast<std::size_t>(known.id)];
@@ -350,7 +353,7 @@ class Models : public Source {
         problem_.layout[id].geometry().Normalise(next[static_cast<std::size_t>(id)].data());
       }
     }
-    // A constant block keeps its value, even if its model computes another one.
+    // A constant block retains its value, even if its model computes another value.
     for (std::size_t id = 0; id < x_.size(); ++id) {
       if (problem_.layout[static_cast<BlockId>(id)].status != BlockStatus::kConstant)
         x_[id] = next[id];
@@ -402,8 +405,8 @@ class Models : public Source {
     const auto m = static_cast<Eigen::Index>(geometry.tangent);
     std::vector<double> z(static_cast<std::size_t>(geometry.ambient));
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> l(m, m);
-    // The noise is drawn before the domain of h is checked. Its sequence is therefore the same for
-    // every true state.
+    // The noise is drawn before the domain of h is checked. The sequence of the noise is therefore
+    // the same for every true state.
     Eigen::VectorXd n(m);
     for (double& value : n) value = sensor.noise.Normal();
     const auto outcome = sensor.schedule.Draw();
@@ -438,7 +441,7 @@ class Models : public Source {
 
   Problem problem_;
   std::vector<StreamInfo> streams_, truths_;
-  std::vector<std::vector<double>> x_;  ///< the true value of each block
+  std::vector<std::vector<double>> x_;  ///< true value of each block
   std::vector<Motion> motions_;
   std::vector<Sensor> sensors_;
   std::vector<std::array<double, 3>> points_;

@@ -8,14 +8,16 @@
 namespace alidade {
 
 inline constexpr const char* kModelsKeys =
-    "start                 prior (default): the true state is drawn from the priors; mean: it is "
-    "the mean of the priors\n"
-    "initial               {ENTRY: {BLOCK: value}}: initial true values, in place of those of "
+    "start                 prior (default): the initial true state is drawn from the priors; mean: "
+    "the initial true state is the mean of the priors\n"
+    "initial               {ENTRY: {BLOCK: value}}: initial true values, which replace those of "
     "`start`\n"
-    "overrides             config of the truth, merged over the config of the filters\n"
+    "overrides             keys of the config that have other values for the truth than for the "
+    "filters\n"
     "sensors               {SENSOR: {rate_hz, missing, outliers: {share, sigma_scale}, known}}; "
     "known: the known numbers of the sensor, one list for each measurement of a time step\n"
-    "inputs                {STATE_ENTRY: {mean, amplitude, frequency_hz}}: its control input\n"
+    "inputs                {STATE_ENTRY: {mean, amplitude, frequency_hz}}: control "
+    "input of the state entry\n"
     "landmarks             {count, box: {min, max}, max_per_frame}: points in the world, m";
 
 /// Simulates truth and measurements with the motion and sensor models of the config.
@@ -32,9 +34,9 @@ inline constexpr const char* kModelsKeys =
 /// value is valid. Each measurement is omitted with the probability `missing`. If several sensors
 /// use one stream, the first of these sensors simulates it. Points are drawn uniformly in `box`;
 /// points of `landmarks.known` are drawn about their given positions. A frame contains the points
-/// that the sensor sees, at most max_per_frame. If it sees more, the points with the smallest ids
-/// are used. The first time step is at `initial_time_s`, or 0. The streams are those of the sensors
-/// and inputs. Each block is a true value.
+/// that the sensor sees, at most max_per_frame. If the sensor sees more points, those with the
+/// smallest ids are used. The first time step is at `initial_time_s`, or 0. The streams are those
+/// of the sensors and inputs. The true values are those of all blocks.
 ///
 /// Each noise has its own random stream of the seed: 0 start, 1 points, 2 orientations of
 /// landmarks, 100 + i motion models, 1000 + 2 i sensors, 1001 + 2 i their missing measurements and

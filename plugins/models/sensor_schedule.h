@@ -15,7 +15,7 @@ namespace alidade::models {
 struct Schedule {
   struct Outcome {
     bool missing;
-    double sigma_scale;  ///< factor of the noise; 1 if it is not an outlier
+    double sigma_scale;  ///< factor of the noise; 1 if the measurement is not an outlier
   };
 
   /// Returns true if the sensor measures at time step `index`.
@@ -52,7 +52,7 @@ inline Schedule ReadSchedule(const std::optional<Node>& entry, double rate_hz, i
     const Node known = entry->At("known", "a sensor with known numbers");
     for (const Node& row : known.Items()) schedule.known.push_back(row.Numbers(known_size));
     if (schedule.known.empty())
-      known.Fail("empty",
+      known.Fail("the list is empty",
                  "a list of " + std::to_string(known_size) + " numbers for each measurement");
   }
   if (const auto sensor_rate = entry->Find("rate_hz")) {

@@ -9,8 +9,8 @@
 namespace alidade {
 namespace {
 
-/// Returns the index i of the interval [t_i, t_i+1] that contains `t`. Returns the first or the
-/// last interval if `t` is beyond the ends.
+/// Returns the index i of the interval [t_i, t_i+1] that contains `t`. Returns the first interval
+/// if `t` is earlier, and the last interval if `t` is later than all intervals.
 std::size_t Interval(const std::vector<double>& times, double t) {
   const auto upper = std::upper_bound(times.begin() + 1, times.end() - 1, t);
   return static_cast<std::size_t>(upper - times.begin()) - 1;

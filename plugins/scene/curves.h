@@ -11,7 +11,8 @@ namespace alidade {
 
 using Quaternion = std::array<double, 4>;  ///< w x y z
 
-/// Natural cubic spline through points y_i at times t_i: C2, curvature 0 at both ends.
+/// Natural cubic spline through points y_i at times t_i. It is C2 and has zero curvature at both
+/// ends.
 ///
 ///   y(t) = (M_i a^3 + M_i+1 b^3) / (6 h) + (y_i / h - M_i h / 6) a + (y_i+1 / h - M_i+1 h / 6) b
 ///          a = t_i+1 - t,  b = t - t_i,  h = t_i+1 - t_i
@@ -23,7 +24,7 @@ using Quaternion = std::array<double, 4>;  ///< w x y z
 /// Source       [Press2007] sec. 3.3.
 class CubicSpline {
  public:
-  /// `times_s` and `points` have the same size, at least one.
+  /// `times_s` and `points` have the same size, at least 1.
   CubicSpline(std::vector<double> times_s, std::vector<Eigen::Vector3d> points);
 
   Eigen::Vector3d At(double t_s) const;
@@ -36,7 +37,7 @@ class CubicSpline {
   std::vector<Eigen::Vector3d> points_, second_derivatives_;  ///< y_i and M_i
 };
 
-/// Cubic Bezier curve on the unit quaternions through q_i at times t_i: C1 for any times.
+/// Cubic Bezier curve on the unit quaternions through q_i at times t_i. It is C1 for any times.
 ///
 ///   q(t) = q_i Exp(b1(s) w1) Exp(b2(s) w2) Exp(b3(s) w3),   s = (t - t_i) / h
 ///          b1 = 1 - (1 - s)^3,  b2 = 3 s^2 - 2 s^3,  b3 = s^3
@@ -46,12 +47,11 @@ class CubicSpline {
 /// With this choice the angular velocity at q_i is omega_i. omega_i is a weighted mean of the rates
 /// of the rotations Log(q_i^-1 q_i+1) before and after q_i. The weight of each rate is the duration
 /// of the other rotation. At each end, omega_i is the rate of the only adjacent rotation. If there
-/// are only two key frames, the curve is a slerp. With more key frames it is a slerp if all
-/// rotations have the same axis and rate.
-/// Source       [Kim1995] sec. 4.
+/// are only two keyframes, the curve is a slerp. With more keyframes, the curve is a slerp if all
+/// rotations have the same axis and rate. Source       [Kim1995] sec. 4.
 class RotationCurve {
  public:
-  /// `times_s` and `values` have the same size, at least one; the values are unit quaternions.
+  /// `times_s` and `values` have the same size, at least 1; the values are unit quaternions.
   RotationCurve(std::vector<double> times_s, std::vector<Quaternion> values);
 
   Quaternion At(double t_s) const;

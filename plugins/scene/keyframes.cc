@@ -11,18 +11,19 @@ namespace alidade::scene {
 Keyframes::Keyframes(Params& p, std::uint64_t seed) : noise_(seed, 5) {
   interval_ = static_cast<std::size_t>(p.Integer(
       "keyframes.every_frames",
-      "frames between keyframes, for stream relative_poses; 0: no keyframes", 0, 1'000'000, 0));
+      "frames from one keyframe to the next, for stream relative_poses; 0: none", 0, 1'000'000, 0));
   if (interval_ == 0) return;
-  sigma_r_ = p.NonNegative("keyframes.sigma_position_m", "m", "noise of a relative pose, 1 sigma");
+  sigma_r_ =
+      p.NonNegative("keyframes.sigma_position_m", "m", "noise of a relative position, 1 sigma");
   sigma_q_ = p.NonNegative("keyframes.sigma_orientation_rad", "rad",
                            "noise of a relative orientation, 1 sigma");
   measures_previous_ = p.Flag("keyframes.to_previous",
                               "whether the pose of the previous keyframe is measured", true);
   radius_ = p.NonNegative("keyframes.closure_radius_m", "m",
-                          "largest distance of a keyframe that closes a loop; 0: no closures", 0.0);
+                          "largest distance of a keyframe that closes a loop; 0: no loops", 0.0);
   min_keyframes_between_ = static_cast<std::size_t>(p.Integer(
       "keyframes.closure_after",
-      "minimum number of keyframes between the two keyframes of a closure", 1, 1'000'000, 50));
+      "minimum number of keyframes between the two keyframes that close a loop", 1, 1'000'000, 50));
 }
 
 void Keyframes::Emit(std::size_t index, const CameraState& state, int stream, std::size_t first,

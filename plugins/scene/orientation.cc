@@ -26,7 +26,7 @@ Quaternion ReadQuaternion(const Node& node) {
   }
   node.RejectUnread();
   if (!(std::abs(std::sqrt(sum) - 1.0) <= 1e-3)) {
-    node.Fail("not of unit length", "w^2 + x^2 + y^2 + z^2 = 1 to 1e-3");
+    node.Fail("the quaternion does not have unit length", "w^2 + x^2 + y^2 + z^2 = 1 to 1e-3");
   }
   UnitQuaternion::Normalise(q.data());
   return q;
@@ -47,18 +47,22 @@ Quaternion ReadOrientation(const Node& node) {
   if (kind == "axis_angle_deg") {
     const std::vector<double> v = value.Numbers(4);
     const Vector3d axis(v[0], v[1], v[2]);
-    if (!(axis.norm() > 0.0)) value.Fail("no axis", "[x, y, z, angle], (x, y, z) not 0");
+    if (!(axis.norm() > 0.0)) {
+      value.Fail("the axis has length 0", "[x, y, z, angle], in which (x, y, z) is not 0");
+    }
     return ToArray(Eigen::Quaterniond(AngleAxisd(kRadPerDeg * v[3], axis.normalized())));
   }
   Eigen::Matrix3d rotation;
   const std::vector<Node> rows = value.Items();
-  if (rows.size() != 3) value.Fail("not three rows", "[[a, b, c], [d, e, f], [g, h, i]]");
+  if (rows.size() != 3) {
+    value.Fail("the matrix does not have three rows", "[[a, b, c], [d, e, f], [g, h, i]]");
+  }
   for (int i = 0; i < 3; ++i) {
     rotation.row(i) = ReadVector(rows[static_cast<std::size_t>(i)]).transpose();
   }
   const double skew = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
   if (!(skew <= 1e-3) || !(rotation.determinant() > 0.0)) {
-    value.Fail("not a rotation", "R R' = I to 1e-3, determinant 1");
+    value.Fail("the matrix is not a rotation", "R R' = I to 1e-3, and determinant 1");
   }
   return ToArray(Eigen::Quaterniond(rotation).normalized());
 }

@@ -7,7 +7,7 @@
 #include "alidade/config/config.h"
 #include "curves.h"
 
-/// Readers of the orientation of a camera, in each form that the config accepts.
+/// Readers of the orientation of a camera in all forms that the config accepts.
 namespace alidade::scene {
 
 using Vector = std::array<double, 3>;
@@ -18,11 +18,11 @@ Quaternion ToArray(const Eigen::Quaterniond& q);
 /// Reads a quaternion `{w: , x: , y: , z: }`, which must have unit length to 1e-3.
 Quaternion ReadQuaternion(const Node& node);
 
-/// Reads the orientation of a key frame, in one of four forms:
+/// Reads the orientation of a keyframe, which has one of four forms:
 ///
 ///   euler_deg: [x, y, z]          R = Rz(z) Ry(y) Rx(x)
 ///   matrix: [[,,], [,,], [,,]]    R, orthonormal to 1e-3, det 1; replaced by the nearest rotation
-///   axis_angle_deg: [x, y, z, a]  rotation by a about (x, y, z), of any length above 0
+///   axis_angle_deg: [x, y, z, a]  rotation by a about the axis (x, y, z), which is not 0
 ///   quaternion: {w, x, y, z}      Hamilton, unit
 Quaternion ReadOrientation(const Node& node);
 
@@ -33,7 +33,8 @@ Quaternion ReadOrientation(const Node& node);
 ///   x = z x up_direction / |z x up_direction|
 ///   y = z x x
 ///
-/// Returns false if z is parallel to up_direction, or not defined: x then does not exist.
+/// Returns false if z is not defined, or is parallel to up_direction. The axis x is then not
+/// defined.
 bool LookAt(const Eigen::Vector3d& position, const Eigen::Vector3d& target,
             const Eigen::Vector3d& up_direction, Quaternion& orientation);
 

@@ -16,13 +16,13 @@ Eigen::Vector3d RandomDirection(Random& random) {
   return point.normalized();
 }
 
-/// Returns points on spheres about the key `centre`. The points cycle through the spheres of
-/// `radii`.
+/// Returns random points on spheres about the point `centre`. Successive points are on successive
+/// spheres of `radii`, cyclically.
 std::vector<Eigen::Vector3d> OnShells(const Node& node, std::size_t count, Random& random) {
   const Node radii_node = node.At("radii", "shells");
   const std::vector<double> radii = radii_node.Numbers();
   for (const double radius : radii) {
-    if (!(radius > 0.0)) radii_node.Fail("a radius that is not positive", "radii > 0, m");
+    if (!(radius > 0.0)) radii_node.Fail("a radius is not positive", "radii > 0, m");
   }
   const auto centre = node.Find("centre");
   const Eigen::Vector3d origin = centre ? ReadVector(*centre) : Eigen::Vector3d::Zero().eval();
@@ -43,7 +43,9 @@ Eigen::Vector3d ReadVector(const Node& node) {
 
 Box::Box(const Node& node)
     : min(ReadVector(node.At("min", "a box"))), max(ReadVector(node.At("max", "a box"))) {
-  if (!(max.array() > min.array()).all()) node.At("max").Fail("not above 'min' in x, y and z");
+  if (!(max.array() > min.array()).all()) {
+    node.At("max").Fail("'max' does not exceed 'min'", "max > min in each of x, y and z");
+  }
   node.RejectUnread();
 }
 
@@ -72,13 +74,14 @@ std::pair<std::string, Node> OneOf(const Node& node, const std::vector<std::stri
   for (const std::string& name : names) {
     const auto entry = node.Find(name);
     if (entry && found) {
-      entry->Fail("'" + found->first + "' and '" + name + "' are both given", "one of " + listed);
+      entry->Fail("'" + found->first + "' and '" + name + "' are both given",
+                  "only one of " + listed);
     }
     if (entry) found.emplace(name, *entry);
   }
   if (!found) {
     node.RejectUnread();  // reports a misspelt key
-    node.Fail("the kind is missing", "one of " + listed);
+    node.Fail("a key is missing", "one of " + listed);
   }
   return *found;
 }
@@ -91,7 +94,7 @@ std::vector<Eigen::Vector3d> ReadPoints(const Node& node, Random& random) {
   if (kind == "list") {
     if (count_node) count_node->Fail("the number of points follows from the list", "only 'list'");
     for (const Node& item : value.Items()) points.push_back(ReadVector(item));
-    if (points.empty()) value.Fail("no points", "a list of [x, y, z], m");
+    if (points.empty()) value.Fail("the list is empty", "a list of [x, y, z], m");
     return points;
   }
   const Node count_entry = node.At("count", "points that are drawn");

@@ -27,11 +27,11 @@ struct Box {
 };
 
 /// Returns the key of `names` that `node` contains, and the value of this key. Fails if `node` does
-/// not contain exactly one of them.
+/// not contain exactly one of these keys.
 std::pair<std::string, Node> OneOf(const Node& node, const std::vector<std::string>& names);
 
-/// Reads the map `points` of the config, see kSceneKeys. Draws points from `random` unless the map
-/// lists them. Errors: kBadConfig.
+/// Reads the map `points` of the config, see kSceneKeys. Draws the points with `random`, unless the
+/// map lists points. Errors: kBadConfig.
 std::vector<Eigen::Vector3d> ReadPoints(const Node& node, Random& random);
 
 }  // namespace alidade::scene

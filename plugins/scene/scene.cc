@@ -98,13 +98,13 @@ class Scene : public Source {
         "max_features_per_frame", "maximum number of points in a frame", 1, 1 << 30, 1 << 30));
     image_noise_grey_ =
         p.NonNegative("image_noise_grey", "1",
-                      "noise of a pixel in images of surfaces, in grey levels of 255", 2.0);
+                      "noise of a pixel in images of surfaces, in grey levels (0 to 255)", 2.0);
     measures_ = static_cast<Measures>(p.Choice("measures", {"pixel", "stereo", "depth"},
                                                "values of a point in stream tracks", kPixel));
     if (measures_ == kStereo) {
       baseline_m_ = p.Positive("camera.baseline_m", "m", "stereo baseline");
       if (camera_.model != CameraModel::kPinhole) {
-        p.Fail("camera.model", "not 'pinhole', but a rectified pair has no distortion");
+        p.Fail("camera.model", "must be 'pinhole', because a rectified pair has no distortion");
       }
     }
     if (measures_ == kDepth) {
@@ -114,11 +114,11 @@ class Scene : public Source {
       remaining_known_ = p.Integer(
           "known_points.count", "number of points with a measured depth at their first observation",
           0, 1 << 20, 0);
-      known_sigma_ =
-          p.Number("known_points.sigma_depth_relative", "", "noise of this depth / depth, 1 sigma",
-                   {0.0, 1.0, true, false}, 0.005);
+      known_sigma_ = p.Number("known_points.sigma_depth_relative", "",
+                              "noise of this depth, relative to the depth, 1 sigma",
+                              {0.0, 1.0, true, false}, 0.005);
     }
-    if (p.Flag("simulate_odometry", "whether the source has a stream odometry", false)) {
+    if (p.Flag("simulate_odometry", "whether the source has the stream odometry", false)) {
       odometry_stream_ = 0;  // DefineStreams() sets the index
       linear_sigma_ = p.NonNegative("odometry_noise.linear_velocity", "m/s",
                                     "noise of each axis, 1 sigma", 0.0);
@@ -203,8 +203,8 @@ class Scene : public Source {
     frame.measurements.push_back(std::move(measurement));
   }
 
-  /// Emits v = V(phi)^-1 R_WC' (r' - r) / dt and omega, with phi = omega dt: the velocities with
-  /// which odometry_pose moves to the next pose.
+  /// Emits v = V(phi)^-1 R_WC' (r' - r) / dt and omega, with phi = omega dt. With these velocities
+  /// odometry_pose moves to the next pose.
   void EmitOdometry(Frame& frame) {
     const scene::CameraState& current = trajectory_[index_];
     const scene::CameraState& next = trajectory_[index_ + 1];

@@ -2,5 +2,5 @@
 #include "alidade/experiment/source_plugin.h"
 #include "scene.h"
 
-ALIDADE_SOURCE_PLUGIN({"scene", "simulator: points in space, seen by a moving camera",
+ALIDADE_SOURCE_PLUGIN({"scene", "simulator: a moving camera observes points in space",
                        alidade::kSceneKeys, &alidade::CreateScene})

@@ -30,7 +30,7 @@ std::vector<Rectangle> ReadSurfaces(const Node& list) {
     double grain_m = 0.5;
     if (const auto grain = item.Find("grain_m")) {
       grain_m = grain->Number();
-      if (!(grain_m > 0.0)) grain->Fail("not positive", "m, > 0");
+      if (!(grain_m > 0.0)) grain->Fail("this length is not positive", "a length above 0 m");
     }
     const auto [kind, value] = OneOf(item, {"box", "rectangle"});
     if (kind == "box") {
@@ -43,7 +43,8 @@ std::vector<Rectangle> ReadSurfaces(const Node& list) {
                                 surfaces.size()};
       const double area = rectangle.right.norm() * rectangle.down.norm();
       if (!(area > 0.0) || std::abs(rectangle.right.dot(rectangle.down)) > 1e-6 * area) {
-        value.Fail("'right' and 'down' are not at right angles", "the edges of a rectangle, m");
+        value.Fail("'right' and 'down' are not edges of a rectangle",
+                   "two perpendicular vectors that are not 0, m");
       }
       value.RejectUnread();
       surfaces.push_back(rectangle);

@@ -21,17 +21,17 @@ namespace {
 /// With these velocities quaternion_pose reproduces the poses exactly.
 using PoseAt = std::function<std::pair<Eigen::Vector3d, Quaternion>(double t_s)>;
 
-/// Returns the times of the items of a list. Either all items have `t_s`, or none of them has.
+/// Returns the times of the items of a list. Either all items have `t_s`, or no item has `t_s`.
 /// Times `t_s` must start at 0, increase, and reach last_s. Without `t_s` the times are spread
 /// evenly over [0, last_s].
 std::vector<double> ReadTimes(const Node& list, const std::vector<Node>& items, double last_s) {
-  if (items.empty()) list.Fail("no items", "at least one item");
+  if (items.empty()) list.Fail("the list is empty", "at least one item");
   std::vector<double> times;
   for (const Node& item : items) {
     const auto time = item.Find("t_s");
     const bool first = times.empty();
     if (!first && time.has_value() != (items.front().Find("t_s").has_value())) {
-      item.Fail("only some items have 't_s'", "'t_s' in all items, or in none");
+      item.Fail("only some items have 't_s'", "'t_s' in all items, or in no item");
     }
     if (!time) {
       const double fraction = first ? 0.0 : double(times.size()) / double(items.size() - 1);
@@ -41,7 +41,7 @@ std::vector<double> ReadTimes(const Node& list, const std::vector<Node>& items, 
     times.push_back(time->Number());
     if (first && times.back() != 0.0) time->Fail("the first time is not 0", "0 in the first item");
     if (!first && !(times.back() > times[times.size() - 2])) {
-      time->Fail("not later than the time of the previous item", "increasing times");
+      time->Fail("this time is not later than the time of the previous item", "increasing times");
     }
   }
   const auto last_time = items.back().Find("t_s");
@@ -86,8 +86,9 @@ std::vector<CameraState> ReadLookAt(const Node& list, const Eigen::Vector3d& up_
     const Eigen::Vector3d camera = position.At(t_s);
     Quaternion orientation;
     if (!LookAt(camera, target.At(t_s), up_direction, orientation)) {
-      list.Fail("at " + std::to_string(t_s) + " s the camera has no orientation",
-                "targets that are neither on the trajectory nor straight above or below it");
+      list.Fail("at " + std::to_string(t_s) + " s the orientation of the camera is not defined",
+                "targets that differ from the position of the camera, and are not directly above "
+                "or below it");
     }
     return std::pair(camera, orientation);
   };
@@ -102,7 +103,7 @@ std::vector<CameraState> ReadKeyframes(const Node& list, std::size_t count, doub
   std::vector<Eigen::Vector3d> positions;
   std::vector<Quaternion> orientations;
   for (const Node& item : items) {
-    positions.push_back(ReadVector(item.At("position", "a key frame")));
+    positions.push_back(ReadVector(item.At("position", "a keyframe")));
     orientations.push_back(ReadOrientation(item));
     item.RejectUnread();
   }
@@ -112,12 +113,15 @@ std::vector<CameraState> ReadKeyframes(const Node& list, std::size_t count, doub
                 dt_s);
 }
 
-/// Reads one number for all axes, or three numbers, one for each axis. They must not be negative.
+/// Reads one number for all axes, or three numbers, one for each axis. The numbers must not be
+/// negative.
 Vector ReadSigmas(const Node& node) {
   const std::vector<double> values = node.Numbers();
-  if (values.size() != 1 && values.size() != 3) node.Fail("wrong length", "one number, or three");
+  if (values.size() != 1 && values.size() != 3) {
+    node.Fail("the list has the wrong length", "one number, or three");
+  }
   for (const double value : values) {
-    if (value < 0.0) node.Fail("negative", "standard deviations of 0 or more");
+    if (value < 0.0) node.Fail("a standard deviation is negative", "numbers of 0 or more");
   }
   return {values.front(), values[values.size() / 2], values.back()};
 }
@@ -160,10 +164,12 @@ std::vector<CameraState> ReadTrajectory(const Node& node, std::size_t count, dou
   const auto up_node = node.Find("up");
   const auto [kind, value] = OneOf(node, {"look_at", "keyframes", "random"});
   if (up_node && kind != "look_at")
-    up_node->Fail("has no effect without 'look_at'", "'up' only with 'look_at'");
+    up_node->Fail("this key has no effect without 'look_at'", "'up' only with 'look_at'");
   const Eigen::Vector3d up_direction =
       up_node ? ReadVector(*up_node) : Eigen::Vector3d(0.0, -1.0, 0.0);
-  if (!(up_direction.norm() > 0.0)) up_node->Fail("has no direction", "a vector that is not 0");
+  if (!(up_direction.norm() > 0.0)) {
+    up_node->Fail("the vector has length 0", "a vector that is not 0");
+  }
   if (kind == "look_at") return ReadLookAt(value, up_direction, count, dt_s);
   if (kind == "keyframes") return ReadKeyframes(value, count, dt_s);
   return DrawTrajectory(value, count, dt_s, random);

@@ -5,12 +5,11 @@ namespace alidade {
 namespace {
 
 constexpr const char* kStereoTargetKeys =
-    "left          images of the left camera, or the only one: a folder, files such as "
+    "left          images of the left or the only camera: a folder, files such as "
     "'pairs/left*.jpg', or a video\n"
     "right         images of the right camera; default: no right camera, and no disparity\n"
-    "stereo        an OpenCV calibration file of the pair with M1, D1, M2, D2, R and T, m; "
-    "default: "
-    "the images are rectified\n"
+    "stereo        OpenCV calibration file of the pair, with M1, D1, M2, D2, R and T (m); "
+    "default: none, and the images must be rectified\n"
     "boxes         table of the target's boxes: frame,x,y,width,height, or frame and four "
     "corners x0,y0,...,x3,y3, px\n"
     "timestamps    table frame,t_s; default: rate_hz, or the rate of a video\n"

@@ -23,9 +23,9 @@ std::map<std::int64_t, FeatureRows::Feature> FeatureRows::ReadFrame(std::int64_t
     Feature& feature = features[next_->feature];
     int& line = feature.lines[next_->dim];
     if (line != 0) {
-      FailLine("a second value of frame " + std::to_string(frame) + ", feature " +
+      FailLine("there is a second value for frame " + std::to_string(frame) + ", feature " +
                    std::to_string(next_->feature) + ", dim " + std::to_string(next_->dim) +
-                   "; the first is in line " + std::to_string(line),
+                   "; the first value is in line " + std::to_string(line),
                "one value");
     }
     line = next_->line;
@@ -59,25 +59,25 @@ void FeatureRows::FailLine(const std::string& problem, std::string_view expected
 void FeatureRows::Advance() {
   const bool first = !next_;
   if (!rows_.Next()) {
-    if (first) FailLine("no rows", std::string("rows ") + kColumns);
+    if (first) FailLine("the file contains no rows", std::string("rows ") + kColumns);
     next_.reset();
     return;
   }
   if (first && rows_.text(0) == "frame") {
     rows_.ExpectColumns(kDims, kColumns);
-    if (!rows_.Next()) FailLine("no rows", "a row below the header");
+    if (!rows_.Next()) FailLine("the file contains no rows", "a row below the header");
   }
   rows_.ExpectColumns(kDims, kColumns);
   Row row{rows_.Index(0, "frame"), rows_.Index(1, "feature"), 0, rows_.Number(3, "value"),
           rows_.line()};
   const std::int64_t dim = rows_.Index(2, "dim");
   if (dim >= static_cast<std::int64_t>(kDims)) {
-    rows_.FailCell(2, "dim", "is unknown", "0 u, 1 v, 2 u_right or depth, 3 v_right");
+    rows_.FailCell(2, "dim", "is unknown", "0 (u), 1 (v), 2 (u_right or depth) or 3 (v_right)");
   }
   row.dim = static_cast<std::size_t>(dim);
   if (!first && row.frame < next_->frame) {
     rows_.FailCell(0, "frame", "is smaller than in line " + std::to_string(next_->line),
-                   "frames in order");
+                   "frames in increasing order");
   }
   next_ = row;
 }

@@ -73,7 +73,7 @@ class Tracks : public Source {
  private:
   void Open(const Node& path, const std::filesystem::path& folder) {
     std::filesystem::path file = path.Text();
-    if (file.empty()) path.Fail("no path", "a file, a folder, or '-' for standard input");
+    if (file.empty()) path.Fail("the path is empty", "a file, a folder, or '-' for standard input");
     if (file != "-") file = folder / file;
     std::error_code ignored;
     if (std::filesystem::is_directory(file, ignored)) file /= "tracks.csv";
@@ -86,7 +86,7 @@ class Tracks : public Source {
     if (const auto times = find_file("timestamps.csv"); times && options_.rate_hz == 0.0) {
       times_.emplace(*times, path.place(), path.path());
     } else if (options_.rate_hz == 0.0) {
-      path.Fail("no timestamps.csv next to the tracks", "that file, or 'rate_hz'");
+      path.Fail("there is no timestamps.csv next to the tracks", "this file, or 'rate_hz'");
     }
     if (const auto path_next_to = find_file("odometry.csv");
         path_next_to && options_.odometry != TracksOptions::kNone) {
@@ -117,8 +117,8 @@ class Tracks : public Source {
       frame_ = *next;
       const double t_s = static_cast<double>(frame_) / options_.rate_hz;
       if (!(t_s < 9.2e9)) {
-        tracks_->FailLine("frame " + std::to_string(frame_) + " is beyond 292 years",
-                          "frame numbers that count from 0 at rate_hz");
+        tracks_->FailLine("the time of frame " + std::to_string(frame_) + " is beyond 292 years",
+                          "frame numbers that start at 0");
       }
       timestamp = TimestampFromSeconds(t_s);
       return true;
@@ -131,8 +131,8 @@ class Tracks : public Source {
     return has_frame;
   }
 
-  /// Appends to `frame` the features of frame_ that are not excluded. If `frame` is null, skips
-  /// them.
+  /// Appends the features of frame_ that are not excluded to `frame`. If `frame` is null, skips
+  /// these features.
   void EmitTracks(Frame* frame) {
     const auto features = tracks_->ReadFrame(frame_);
     for (const auto& [id, feature] : features) {
@@ -141,7 +141,7 @@ class Tracks : public Source {
     }
   }
 
-  /// Appends to `frame` the observations of frame_ that determine depth. Drops the observations of
+  /// Appends the observations of frame_ that determine depth to `frame`. Drops the observations of
   /// skipped frames.
   void EmitKnown(Frame& frame) {
     for (auto next = known_->next_frame(); next && *next <= frame_; next = known_->next_frame()) {

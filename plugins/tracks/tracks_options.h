@@ -17,7 +17,7 @@ struct TracksOptions {
   Measures measures;
   double rate_hz;
   std::int64_t start_frame;    ///< first frame of the source
-  std::int64_t features_from;  ///< omits features that occur in an earlier frame
+  std::int64_t features_from;  ///< features that occur in an earlier frame are omitted
   std::int64_t max_frames;     ///< maximum number of frames
   Odometry odometry;
   Timestamp tolerance;  ///< maximum time from a frame to its true pose
@@ -26,24 +26,23 @@ struct TracksOptions {
   explicit TracksOptions(Params& p)
       : measures(static_cast<Measures>(p.Choice("measures", {"pixel", "stereo", "depth"},
                                                 "values of a feature in stream tracks", kPixel))),
-        rate_hz(p.Number("rate_hz", "Hz",
-                         "frames per second, if there is no timestamps.csv; 0: timestamps.csv",
+        rate_hz(p.Number("rate_hz", "Hz", "frames per second; 0: timestamps.csv contains the times",
                          {0.0, 1e6}, 0.0)),
-        start_frame(p.Integer("start_frame", "frames before this one are skipped", 0, 1 << 30, 0)),
-        features_from(p.Integer("features_from",
-                                "features of earlier frames are omitted from all frames", 0,
-                                1 << 30, 0)),
+        start_frame(
+            p.Integer("start_frame", "first frame; earlier frames are skipped", 0, 1 << 30, 0)),
+        features_from(p.Integer(
+            "features_from", "features that occur before this frame are omitted", 0, 1 << 30, 0)),
         max_frames(p.Integer("max_frames", "maximum number of frames; 0: all", 0, 1 << 30, 0)),
-        odometry(static_cast<Odometry>(p.Choice(
-            "odometry", {"none", "zero_order_hold", "mean"},
-            "odometry of a frame: none, its row, or the mean of its row and the next frame's row",
-            kZeroOrderHold))),
-        tolerance(TimestampFromSeconds(
-            p.Number("truth_tolerance_s", "s",
-                     "maximum time difference of the true pose of a frame", {0.0, 1e3}, 1e-3))),
+        odometry(static_cast<Odometry>(
+            p.Choice("odometry", {"none", "zero_order_hold", "mean"},
+                     "odometry of a frame: none; its row; or the mean of its row and the next row",
+                     kZeroOrderHold))),
+        tolerance(TimestampFromSeconds(p.Number("truth_tolerance_s", "s",
+                                                "maximum time from a frame to its true pose",
+                                                {0.0, 1e3}, 1e-3))),
         world(static_cast<World>(p.Choice(
             "world", {"file", "first_camera"},
-            "coordinate frame of the true poses: the file's world, or the first frame's camera",
+            "coordinate frame of the true poses: the world of the file, or the first camera",
             kFile))) {
     if (max_frames == 0) max_frames = INT64_MAX;
   }

@@ -6,11 +6,12 @@ namespace alidade {
 namespace {
 
 constexpr const char* kImageTracksKeys =
-    "path           a folder of images, in the order of their names, a video, or a camera\n"
-    "images         pattern of the image files: 'left_*.png'; default: all endings of image files\n"
+    "path           folder of images, which are read in the order of their names; video; or "
+    "camera\n"
+    "images         pattern of the file names, such as 'left_*.png'; default: all image files\n"
     "known          table u,v,depth_m of points in the first image, which determine the scale\n"
-    "guide          filter of `estimators`: features are searched for at its expected positions\n"
-    "state_entry    state entry in the names of the truth; default cam";
+    "guide          filter of `estimators` that predicts the positions of features; default none\n"
+    "state_entry    state entry to which the true values belong; default cam";
 
 std::unique_ptr<Source> CreateImageTracks(const SourceArguments& arguments) {
   return CreateOnDemand("image_tracks", arguments);
@@ -19,7 +20,7 @@ std::unique_ptr<Source> CreateImageTracks(const SourceArguments& arguments) {
 }  // namespace
 }  // namespace alidade
 
-ALIDADE_SOURCE_PLUGIN({"tracks", "features tracked through images, from rows of a file or a pipe",
+ALIDADE_SOURCE_PLUGIN({"tracks", "tracked features of images, read from a file or a pipe",
                        alidade::kTracksKeys, &alidade::CreateTracks},
-                      {"image_tracks", "features found in images and tracked through them",
+                      {"image_tracks", "features that are found in images and tracked",
                        alidade::kImageTracksKeys, &alidade::CreateImageTracks})

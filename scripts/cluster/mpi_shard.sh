@@ -5,13 +5,14 @@
 #
 # Runs one shard of `alidade sweep CONFIG --runs R ...` with one thread. Rank i of N, counted from
 # 0, runs shard i + 1. Writes to OUT.shards. The ranks do not communicate, so OpenMPI, MPICH and
-# `srun -n N` are suitable. Merge the shards when all ranks have ended. If the two commands are
-# joined by `&&`, the merge runs only if no rank was stopped:
+# `srun -n N` are suitable. Merge the shards when all ranks have ended. Because of `&&` in this
+# example, the merge runs only if no rank was stopped:
 #
 #   mpirun -n 64 scripts/cluster/mpi_shard.sh runs/big config.yaml --runs 10000 &&
 #     alidade merge runs/big.shards/* -o runs/big
 #
-# A second call resumes the sweep. The variable ALIDADE names the program; default: alidade.
+# A second call resumes the sweep. The environment variable ALIDADE contains the path of the
+# program; default: alidade.
 set -euo pipefail
 
 rank=${OMPI_COMM_WORLD_RANK:-${PMI_RANK:-${SLURM_PROCID:-}}}

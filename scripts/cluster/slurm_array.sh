@@ -10,8 +10,8 @@
 #   scripts/cluster/slurm_array.sh --cpus-per-task=4 -- 16 runs/big config.yaml --runs 10000
 #
 # Writes shards and logs to OUT.shards. If a task is stopped, killed or requeued, its finished runs
-# remain. Submit the same command again to complete the others. The variable ALIDADE names the
-# program; default: alidade.
+# remain. To complete the other runs, submit the same command again. The environment variable
+# ALIDADE contains the path of the program; default: alidade.
 set -euo pipefail
 alidade=${ALIDADE:-alidade}
 
@@ -31,15 +31,15 @@ submit() {
   array=$(sbatch --parsable --job-name=sweep --array="1-$shards" --requeue --open-mode=append \
     --output="$out.shards/%a.log" "${options[@]}" "$0" --task "$shards" "$out" "$@")
   array=${array%%;*} # the job ID, without `;CLUSTER`
-  # The dependency is `afterany`, because `alidade merge` reports missing and unfinished shards
-  # itself.
+  # The merge starts after any end of the tasks (`afterany`), because `alidade merge` reports
+  # missing and unfinished shards.
   merge=$(sbatch --parsable --job-name=merge --dependency="afterany:$array" --open-mode=append \
     --output="$out.shards/merge.log" "${options[@]}" "$0" --merge "$shards" "$out")
   echo "submitted: shards $array, merge ${merge%%;*}"
 }
 
-# `exec` replaces the shell, so signals of Slurm reach the program, for example before the time
-# limit ends.
+# `exec` replaces the shell, so the signals that Slurm sends, for example before the time limit,
+# reach the program.
 case ${1:-} in
   --task)
     shards=$2 out=$3

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests data that come with a calibration. A model reads this calibration if the config has none. A
-// config with a different calibration is refused.
+// Tests data that contain a calibration. A model uses this calibration if the config contains none.
+// A config with a different calibration is refused.
 #include "support/program.h"
 
 namespace alidade {
@@ -12,7 +12,7 @@ using testing::Contains;
 using testing::Outcome;
 
 const std::string kRemedy =
-    "; expected the same value, no such key (the data determine it), or 'source.calibration: "
+    "; expected the same value; correct or remove this key, or set 'source.calibration: "
     "ignore'\n";
 
 class CalibrationCli : public testing::ProgramTest {
@@ -36,7 +36,7 @@ class CalibrationCli : public testing::ProgramTest {
     for (int k = 0; k < 20; ++k) text += std::to_string(0.1 * k) + ",86.5\n";
     Write("table.csv", text);
   }
-  /// Writes a config that reads the table. `keys` are added to the entry of its stereo sensor.
+  /// Writes a config that reads the table. `keys` are added to the entry of the stereo sensor.
   void WriteConfig(const std::string& keys) const {
     Write("depth.yaml", testing::kTargetConfig +
                             "sensors:\n  stereo: {model: stereo_disparity, stream: disparity, "
@@ -65,7 +65,8 @@ class CalibrationCli : public testing::ProgramTest {
     fs::remove(folder_ / "drive/calibration.yaml");
     if (!calibration.empty()) Write("drive/calibration.yaml", calibration);
   }
-  /// Writes a config that reads the tracks. `root` is added at its root, and `keys` to its sensor.
+  /// Writes a config that reads the tracks. Adds `root` at the root of the config, and `keys` to
+  /// the entry of the sensor.
   void WriteSlam(const std::string& root, const std::string& keys) const {
     Write("slam.yaml", R"(alidade: 1
 state:
@@ -145,7 +146,9 @@ TEST_F(CalibrationCli, WhatAHeaderTellsMustBeANumberOnce) {
   WriteTable(std::string(kHeader) + "# baseline_m=0.1\n");
   const Outcome twice = Run("depth.yaml");
   EXPECT_EQ(twice.code, 65);
-  EXPECT_TRUE(Contains(twice.err, "table.csv:2:14 baseline_m: occurs twice, first in line 1"))
+  EXPECT_TRUE(Contains(twice.err,
+                       "table.csv:2:14 baseline_m: there is a second value; the first value is in "
+                       "line 1"))
       << twice.err;
   WriteTable("# fx_px=-4 baseline_m=0.065\n");
   const Outcome negative = Run("depth.yaml");
@@ -222,8 +225,8 @@ TEST_F(CalibrationCli, ACalibrationThatIsNotUnderstoodIsRefused) {
   const Outcome other = Run("slam.yaml");
   EXPECT_EQ(other.code, 65);
   EXPECT_TRUE(Contains(other.err,
-                       "no calibration of a camera; expected 'camera', 'intrinsics_px', or a file "
-                       "of OpenCV, ROS, Kalibr or EuRoC"))
+                       "the file contains no calibration of a camera; expected 'camera', "
+                       "'intrinsics_px', or a file of OpenCV, ROS, Kalibr or EuRoC"))
       << other.err;
 }
 

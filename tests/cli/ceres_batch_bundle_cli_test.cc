@@ -34,7 +34,8 @@ TEST_F(BundleCli, AdjustsAndWritesTheSameFormat) {
   EXPECT_EQ(again.code, 0) << again.err;
   EXPECT_LT(Json("out/bundle.json").root().At("rms_after_px").Number(), 1e-8);
   EXPECT_EQ(Call({"bundle", "p.txt", "-o", "out"}).code, 73);
-  EXPECT_EQ(Call({"bundle", "none.txt", "-o", "out"}).code, 73) << "before anything is read";
+  EXPECT_EQ(Call({"bundle", "none.txt", "-o", "out"}).code, 73)
+      << "an existing output is refused before the input is read";
   EXPECT_EQ(Call({"bundle", "p.txt", "-o", "out", "--force", "--quiet"}).out, "");
 }
 
@@ -72,7 +73,7 @@ TEST_F(BundleCli, SaysWhatIsWrong) {
   Write("p.txt", BundleText(file));
   const Outcome few = Call({"bundle", "p.txt", "--max-iterations", "2"});
   EXPECT_EQ(few.code, 1);
-  EXPECT_TRUE(Contains(few.err, "not converged: ")) << few.err;
+  EXPECT_TRUE(Contains(few.err, "the adjustment has not converged: ")) << few.err;
 }
 
 const std::string kScene = R"(alidade: 1
@@ -89,12 +90,12 @@ source:
 
 class BundleTracksCli : public BundleCli {
  protected:
-  /// Writes the folder `data/`: runs `simulate` with kScene.
+  /// Runs `simulate` with kScene. This command writes the folder `data/`.
   void SetUp() override {
     BundleCli::SetUp();
     Simulate("");
   }
-  /// Simulates kScene; `stereo` contains lines that are added to its source.
+  /// Simulates kScene, with the lines of `stereo` added to its source.
   void Simulate(const std::string& stereo, const Arguments& more = {}) const {
     std::string scene = kScene;
     Write("scene.yaml", scene.replace(scene.find("  STEREO\n"), 9, stereo));
@@ -109,8 +110,8 @@ class BundleTracksCli : public BundleCli {
     all.insert(all.end(), more.begin(), more.end());
     return Call(all);
   }
-  /// Returns the first `count` poses of `data/truth.tum`. Times are shifted by `dt_s`, and x by
-  /// `dx_m`.
+  /// Returns the first `count` poses of `data/truth.tum`, with times shifted by `dt_s` and x
+  /// shifted by `dx_m`.
   std::string Start(int count, double dt_s, double dx_m) const {
     std::istringstream truth(Read("data/truth.tum"));
     std::string text, line;
@@ -126,8 +127,9 @@ class BundleTracksCli : public BundleCli {
   }
 };
 
-/// Noise of 1 px in u and v leaves residuals of sqrt(2 (1 - unknowns / residuals)) px. There are
-/// 1000 more residuals than unknowns, so the standard deviation of this value is 2 %.
+/// With noise of 1 px in u and in v, the RMS error after the adjustment is sqrt(2 (1 - unknowns /
+/// residuals)) px. There are 1000 more residuals than unknowns, so the standard deviation of this
+/// RMS error is 2 %.
 TEST_F(BundleTracksCli, AdjustsTracks) {
   Write("start.tum", Start(15, 0.0, 0.05));
   const Outcome made = Bundle("data/tracks.csv", "start.tum", {"-o", "out"});
@@ -135,7 +137,7 @@ TEST_F(BundleTracksCli, AdjustsTracks) {
   EXPECT_TRUE(Contains(made.out, "tracks: 15 cameras, ")) << made.out;
   const Config json = Json("out/bundle.json");
   const auto number = [&](const char* key) { return json.root().At(key).Number(); };
-  EXPECT_GT(number("rms_before_px"), 2.5) << "4 m away, 5 cm are 6.6 px";
+  EXPECT_GT(number("rms_before_px"), 2.5) << "a shift of 5 cm at a distance of 4 m is 6.6 px";
   const double left = std::sqrt(2.0 * (1.0 - number("unknowns") / number("residuals")));
   EXPECT_NEAR(number("rms_after_px"), left, 0.08 * left);
   EXPECT_FALSE(Exists("out/problem.txt"));
@@ -143,8 +145,9 @@ TEST_F(BundleTracksCli, AdjustsTracks) {
   EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n'), 15);
 }
 
-/// A stereo pair with a baseline of 0.2 m sees points 30 to 45 m away. Their disparity is 2 to 4 px
-/// with a noise of 1.4 px, but rays over 5 m of path determine their depth to about 1.5 %.
+/// A stereo pair with a baseline of 0.2 m sees points 30 to 45 m away. The disparity of these
+/// points is 2 to 4 px with a noise of 1.4 px. Nevertheless, rays over 5 m of path determine the
+/// depth of the points to about 1.5 %.
 TEST_F(BundleTracksCli, PlacesPointsOfAStereoPairByTheirRays) {
   Simulate("  measures: stereo\n",
            {"--set", "camera.baseline_m=0.2", "--set",
@@ -174,8 +177,8 @@ TEST_F(BundleTracksCli, PlacesPointsOfAStereoPairByTheirRays) {
             Json("start/bundle.json").root().At("rms_after_px").Number());
 }
 
-/// The lens distorts rays only up to some radius, and the pixel in the corner lies beyond it. The
-/// other two rays still determine the point.
+/// The distortion model defines a ray only up to some radius, and the pixel in the corner lies
+/// beyond this radius. The other two rays still determine the point.
 TEST_F(BundleTracksCli, PlacesAPointThatHasAPixelWithoutARay) {
   Write("data/calibration.yaml",
         "camera: {model: radtan, width: 640, height: 480, fx: 300, fy: 300, cx: 320, cy: 240, "
@@ -186,7 +189,7 @@ TEST_F(BundleTracksCli, PlacesAPointThatHasAPixelWithoutARay) {
   EXPECT_TRUE(Contains(Read("out/points.csv"), "\n1,"));
   const std::string points = Read("out/points.csv");
   EXPECT_NEAR(std::stod("0" + points.substr(points.rfind(',') + 1)), 3.0, 1e-6)
-      << "0.3 m / 0.1, for 0.1 (1 - 0.4 0.01) 300 px = 29.88 px";
+      << "the depth is 0.3 m / 0.1, because 0.1 (1 - 0.4 0.01) 300 px = 29.88 px";
 }
 
 TEST_F(BundleTracksCli, CountsFramesWithoutAPose) {
@@ -194,7 +197,7 @@ TEST_F(BundleTracksCli, CountsFramesWithoutAPose) {
   const Outcome made = Bundle("data/tracks.csv", "start.tum", {"-o", "out"});
   EXPECT_EQ(made.code, 0) << made.err;
   EXPECT_TRUE(Contains(made.out, "tracks: 5 cameras, ")) << made.out;
-  EXPECT_TRUE(Contains(made.out, "; 10 frames left out, because they have no pose")) << made.out;
+  EXPECT_TRUE(Contains(made.out, "; excluded frames without a pose: 10")) << made.out;
   const std::string rows = Read("data/tracks.csv");
   const Config json = Json("out/bundle.json");
   const auto number = [&](const char* key) { return json.root().At(key).Number(); };
@@ -203,15 +206,16 @@ TEST_F(BundleTracksCli, CountsFramesWithoutAPose) {
   EXPECT_EQ(
       number("observations") + number("observations_of_these") + number("observations_invalid"),
       static_cast<double>(std::count(rows.begin(), rows.end(), '\n') - 1) / 2)
-      << "a row each of u and v";
+      << "one row for u and one row for v";
   Write("start.tum", Start(5, 100.0, 0.0));
   const Outcome none = Bundle("data/tracks.csv", "start.tum");
   EXPECT_EQ(none.code, 65);
   EXPECT_TRUE(Contains(none.err, "start.tum: no pose has the timestamp of a frame")) << none.err;
 }
 
-/// Without timestamps the k-th pose belongs to frame k, whatever the times of the poses are. Tracks
-/// from standard input have no timestamps, even if the working folder contains timestamps.csv.
+/// Without timestamps the k-th pose belongs to frame k, regardless of the times of the poses.
+/// Tracks from standard input have no timestamps, even if the working folder contains
+/// timestamps.csv.
 TEST_F(BundleTracksCli, TakesPosesByTheirNumberWhereThereAreNoTimestamps) {
   Write("start.tum", Start(5, 100.0, 0.0));
   Write("tracks.csv", Read("data/tracks.csv"));
@@ -235,15 +239,18 @@ TEST_F(BundleTracksCli, SaysWhatIsWrong) {
       << twice.err;
   Write("half.csv", "0,1,0,10\n0,2,0,10\n0,2,1,20\n");
   const Outcome half = Bundle("half.csv", "data/truth.tum");
-  EXPECT_TRUE(Contains(half.err, "half.csv:1: frame 0 has no dim 1 of feature 1")) << half.err;
+  EXPECT_TRUE(Contains(half.err, "half.csv:1: in frame 0, feature 1 has no row with dim 1"))
+      << half.err;
   const std::string start = Read("data/truth.tum");
   const Outcome over = Bundle("data/tracks.csv", "data/truth.tum", {"-o", "data", "--force"});
   EXPECT_EQ(over.code, 73);
-  EXPECT_TRUE(Contains(over.err, "data: contains the input 'data/tracks.csv'")) << over.err;
+  EXPECT_TRUE(Contains(over.err, "data: the folder contains the input 'data/tracks.csv'"))
+      << over.err;
   EXPECT_EQ(Read("data/truth.tum"), start);
   const std::string times = Read("data/timestamps.csv");
   Write("data/timestamps.csv", "");
-  EXPECT_TRUE(Contains(Bundle("data/tracks.csv", "data/truth.tum").err, "timestamps.csv: no rows"));
+  EXPECT_TRUE(Contains(Bundle("data/tracks.csv", "data/truth.tum").err,
+                       "timestamps.csv: the file contains no rows"));
   Write("data/timestamps.csv", times);
   Write("late.tum", "1e300 0 0 0 0 0 0 1\n");
   const Outcome late = Bundle("data/tracks.csv", "late.tum");
@@ -262,8 +269,8 @@ TEST_F(BundleCli, AStandardInputThatCannotBeReadIsNotEmpty) {
   EXPECT_TRUE(folder.err.starts_with("error: <stdin>: Is a directory")) << folder.err;
 }
 
-/// Three problems without a usable observation: a point in the plane of its only camera, a point so
-/// far away that its pixels are not finite, and an empty problem.
+/// None of these three problems has a usable observation: a point in the plane of its only camera,
+/// a point so far away that its pixels are not finite, and an empty problem.
 TEST_F(BundleCli, RefusesAProblemOfWhichNothingIsDefined) {
   const std::string camera = "0\n0\n0\n0\n0\n0\n500\n0\n0\n";
   for (const std::string& text :
@@ -278,7 +285,7 @@ TEST_F(BundleCli, RefusesAProblemOfWhichNothingIsDefined) {
   }
 }
 
-/// One observation in four is of a point behind its camera. The formula of BAL also defines the
+/// One observation in four shows a point behind its camera. The formula of BAL also defines the
 /// cost of these observations.
 TEST_F(BundleCli, CountsAllObservationsOfABalFile) {
   BundleFile file = testing::BundleOnBothSides();
@@ -286,7 +293,7 @@ TEST_F(BundleCli, CountsAllObservationsOfABalFile) {
   Write("p.txt", BundleText(file));
   const Outcome made = Call({"bundle", "p.txt", "-o", "out"});
   EXPECT_EQ(made.code, 0) << made.err;
-  EXPECT_FALSE(Contains(made.out, "left out")) << made.out;
+  EXPECT_FALSE(Contains(made.out, "excluded")) << made.out;
   const Config json = Json("out/bundle.json");
   const auto number = [&](const char* key) { return json.root().At(key).Number(); };
   EXPECT_EQ(number("residuals"), 2.0 * static_cast<double>(file.problem.observations.size()));
@@ -295,19 +302,20 @@ TEST_F(BundleCli, CountsAllObservationsOfABalFile) {
   std::istringstream before(Read("p.txt")), after(Read("out/problem.txt"));
   EXPECT_NEAR(number("rms_before_px"), testing::BalFormula(before).Rms(), 1e-9);
   EXPECT_NEAR(number("rms_after_px"), testing::BalFormula(after).Rms(), 1e-9);
-  EXPECT_LT(number("rms_after_px"), std::sqrt(0.5)) << "the noise";
+  EXPECT_LT(number("rms_after_px"), std::sqrt(0.5))
+      << "expected less than the noise of the observations";
 }
 
-/// The second point lies in the plane of the camera. It has no pixel, so its observation is counted
-/// as left out.
+/// The second point lies in the plane of the camera, so it has no pixel. The observation of this
+/// point is counted as left out.
 TEST_F(BundleCli, CountsWhatIsLeftOut) {
   Write("p.txt", "1 2 2\n0 0 1 1\n0 1 1 1\n0\n0\n0\n0\n0\n0\n500\n0\n0\n0.1\n0.1\n-3\n1\n1\n0\n");
   const Outcome made = Call({"bundle", "p.txt", "-o", "out"});
   EXPECT_EQ(made.code, 0) << made.err;
   EXPECT_TRUE(
       Contains(made.out,
-               "2 observations; 1 left out, because the residual is undefined or not finite at the "
-               "start: in the camera's plane"))
+               "2 observations; excluded observations: 1 of points in the plane of the camera, "
+               "with residuals that are undefined or not finite at the start"))
       << made.out;
   const Config json = Json("out/bundle.json");
   EXPECT_EQ(json.root().At("observations").Number(), 2.0);
@@ -341,7 +349,7 @@ TEST_F(BundleCli, HoldsTheScale) {
 }
 
 /// The derivative of this pixel with respect to k2 overflows. The message of Ceres is half a page
-/// long; the program prints one line.
+/// long, but the program prints only one line.
 TEST_F(BundleCli, TellsInItsOwnWordsWhatTheSolverSays) {
   Write("p.txt", "1 1 1\n0 0 1 1\n0\n0\n0\n0\n0\n0\n500\n0\n0\n1e80\n0.1\n-1\n");
   const Outcome made = Call({"bundle", "p.txt", "-o", "out"});
@@ -350,8 +358,8 @@ TEST_F(BundleCli, TellsInItsOwnWordsWhatTheSolverSays) {
   EXPECT_FALSE(Exists("out"));
 }
 
-/// During the iterations more than five consecutive steps cannot be computed. A smaller trust
-/// region makes further steps possible.
+/// During the iterations, more than five consecutive steps cannot be computed. With a smaller trust
+/// region, further steps can be computed.
 TEST_F(BundleCli, GoesOnAfterStepsThatCannotBeComputed) {
   for (const int points : {28, 36}) {
     BundleFile file = testing::BundleOnBothSides(3, points);

@@ -33,7 +33,7 @@ TEST_F(Cli, UsageErrorsExitWithTwoAndNameHelp) {
             "error: unknown command 'rnu'; did you mean 'run'?\nsee `alidade --help`\n");
   EXPECT_EQ(mistyped.out, "");
 
-  EXPECT_EQ(Call({}).err, "error: missing command\nsee `alidade --help`\n");
+  EXPECT_EQ(Call({}).err, "error: a command is missing\nsee `alidade --help`\n");
   EXPECT_EQ(Call({"run", "config.yaml", "--forec"}).err,
             "error: unknown option '--forec'; did you mean '--force'?\nsee `alidade run --help`\n");
   EXPECT_EQ(Call({"plugins", "info"}).err,
@@ -77,8 +77,8 @@ TEST_F(Cli, UnderscoresInTheNameOfAnOptionMeanHyphens) {
                   "--plugin_path=" ALIDADE_BINARY_DIR "/lib/alidade/plugins"})
                 .code,
             0);
-  // Underscores in the values of options do not change. The record contains the command line as it
-  // was entered.
+  // Underscores become hyphens in option names only, not in option values. The record contains the
+  // command line as the user entered it.
   EXPECT_EQ(Call({"run", "config.yaml", "--output=b_c", "--no_figures",
                   "--set=source.sigma_disparity_px=0"})
                 .code,
@@ -142,7 +142,8 @@ TEST_F(Cli, ConfigErrorsHavePlaceAndRemedy) {
   EXPECT_TRUE(include.err.starts_with("error: --set include: cannot be set, because files"));
   const Outcome nameless = Call({"run", "config.yaml", "--set", "plugins=['']"});
   EXPECT_EQ(nameless.code, 78);
-  EXPECT_TRUE(nameless.err.starts_with("error: --set plugins[0]: empty path")) << nameless.err;
+  EXPECT_TRUE(nameless.err.starts_with("error: --set plugins[0]: the path is empty"))
+      << nameless.err;
 
   EXPECT_EQ(Call({"run", "missing.yaml"}).code, 66);
   Write("table.csv", "t_s,d\n0,80\n");
@@ -166,13 +167,16 @@ TEST_F(Cli, UntrustedPluginIsRefusedWithSeventySeven) {
   // These commands report the refused plugin and continue with the others.
   const Outcome where = Call({"plugins", "where", "--plugin-path", "alidade_constant.so"});
   EXPECT_EQ(where.code, 0) << where.err;
-  EXPECT_TRUE(Contains(where.out, plugin.string() + " (given): 0 found, 1 refused\n")) << where.out;
+  EXPECT_TRUE(Contains(where.out,
+                       plugin.string() + " (config or command line): 0 entries found, 1 refused\n"))
+      << where.out;
   EXPECT_TRUE(Contains(where.out, "refused " + plugin.string() + ": not trusted")) << where.out;
   EXPECT_TRUE(Contains(where.out, "(next to the program): ")) << where.out;
   const Outcome nowhere = Call({"plugins", "where", "--plugin-path", "none.so"});
-  EXPECT_TRUE(Contains(nowhere.out, "/none.so (given): does not exist\n")) << nowhere.out;
+  EXPECT_TRUE(Contains(nowhere.out, "/none.so (config or command line): does not exist\n"))
+      << nowhere.out;
   const Outcome doctor = Call({"doctor", "--plugin-path", "alidade_constant.so"});
-  EXPECT_TRUE(Contains(doctor.out, "warn  refused " + plugin.string())) << doctor.out;
+  EXPECT_TRUE(Contains(doctor.out, "warn  plugin " + plugin.string())) << doctor.out;
 }
 
 TEST_F(Cli, BadDataEndsTheRunAndLeavesARecord) {
@@ -197,7 +201,7 @@ TEST_F(Cli, DivergenceEndsTheRunWhereAsked) {
   EXPECT_EQ(Json("runs/config/run.json").root().At("status").Text(), "failed");
 }
 
-// Fault 89 of tests/faults/README.md.
+// Tests fault 89 of tests/faults/README.md.
 TEST_F(Cli, OutputThatCannotBeWrittenIsSeventyFour) {
   const Outcome full = Call({"run", "config.yaml", "--no-figures"}, "/dev/full");
   EXPECT_EQ(full.code, 74);
@@ -229,10 +233,11 @@ class PipedRun : public testing::ProgramTest {
   pid_t run_ = -1;
 };
 
-// Fault 90 of tests/faults/README.md.
+// Tests fault 90 of tests/faults/README.md.
 TEST_F(PipedRun, StopsAtASignalWithAllThatIsDone) {
   ::kill(run_, SIGINT);
-  Feed("0.3,83\n");  // a signal that arrives just before the run waits is handled at the next row
+  Feed("0.3,83\n");  // If a signal arrives just before the run waits for input, the run handles it
+                     // at the next row.
   const Outcome run = Wait(run_);
   EXPECT_EQ(run.code, 75) << run.err;
   const Config record = Json("out/run.json");
@@ -243,7 +248,7 @@ TEST_F(PipedRun, StopsAtASignalWithAllThatIsDone) {
   EXPECT_FALSE(Exists("out.partial"));
 }
 
-// Fault 90 of tests/faults/README.md.
+// Tests fault 90 of tests/faults/README.md.
 TEST_F(PipedRun, EndsAtOnceAtTheSecondSignal) {
   ::kill(run_, SIGSTOP);
   ::kill(run_, SIGTERM);
@@ -315,8 +320,8 @@ TEST_F(Cli, StopsBetweenFramesAtASignal) {
   EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "stopped");
 }
 
-// SIGHUP is ignored, as under nohup. If it were counted, SIGTERM would be the second signal and
-// would end the run at once.
+// The program ignores SIGHUP if it was started with SIGHUP ignored, as nohup does. If SIGHUP were
+// counted, SIGTERM would be the second signal and would end the run at once.
 TEST_F(Cli, AHangUpThatIsIgnoredStopsNothing) {
   before_ = "trap '' HUP";
   const pid_t run = Start(
@@ -356,7 +361,7 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
         "rejection_recovery.after", "[1, 1e+06]", "inf", "on_divergence"}) {
     EXPECT_TRUE(Contains(ekf.out, part)) << part << '\n' << ekf.out;
   }
-  EXPECT_TRUE(Contains(ekf.out, "state, sensors, landmarks and initial_time_s of this estimator"));
+  EXPECT_TRUE(Contains(ekf.out, "state, sensors, landmarks and initial_time_s for this estimator"));
   EXPECT_TRUE(Contains(Call({"plugins", "info", "ekf", "--json"}).out, "\"estimator\""));
   const Outcome iekf = Call({"plugins", "info", "iekf"});
   for (const char* part : {"iekf: estimator", "max_iterations", "[2, 1000]", "tolerance"}) {
@@ -380,7 +385,7 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
 }
 
 TEST_F(Cli, PluginsPrintsJson) {
-  // JSON is valid YAML.
+  // Every JSON text is valid YAML, so Config can parse it.
   const auto parse = [](const std::string& json) {
     return Config::FromText("list:\n  " + json, "json");
   };

@@ -15,7 +15,8 @@ using testing::Contains;
 using testing::Outcome;
 namespace fs = std::filesystem;
 
-/// For tests that do not need the batch. The batch is missing in a build without the Ceres solver.
+/// For tests that do not need the batch estimator, which a build without the Ceres solver does not
+/// contain.
 class CompareFolderCli : public testing::ProgramTest {};
 
 TEST_F(CompareFolderCli, SaysHowManyRowsAreNotFinite) {
@@ -23,7 +24,7 @@ TEST_F(CompareFolderCli, SaysHowManyRowsAreNotFinite) {
   EXPECT_FALSE(Contains(Call({"compare", "out"}).out, "not finite"));
   std::istringstream rows(Read("out/ekf/estimates.csv"));
   std::string text;
-  int count = -1;  // does not count the header
+  int count = -1;  // the header is not counted
   for (std::string row; std::getline(rows, row); ++count) {
     const std::size_t first = row.find(','), second = row.find(',', first + 1);
     if (count == 3 || count == 7) row.replace(first + 1, second - first - 1, "nan");
@@ -32,7 +33,8 @@ TEST_F(CompareFolderCli, SaysHowManyRowsAreNotFinite) {
   }
   Write("out/ekf/estimates.csv", text);
   const std::string note = "out/ekf/estimates.csv': 3 of " + std::to_string(count) +
-                           " rows have values that are not finite; the comparison ignores them";
+                           " rows contain values that are not finite; the comparison ignores these "
+                           "values";
   EXPECT_TRUE(Contains(Call({"compare", "out"}).out, note)) << Call({"compare", "out"}).out;
   EXPECT_TRUE(Contains(Call({"compare", "out", "--json"}).out, note));
 }
@@ -41,7 +43,9 @@ class CompareCli : public testing::ProgramTest {
  protected:
   void SetUp() override {
     ProgramTest::SetUp();
-    if (!Contains(Call({"plugins", "list"}).out, "ceres_batch")) GTEST_SKIP() << "no batch";
+    if (!Contains(Call({"plugins", "list"}).out, "ceres_batch")) {
+      GTEST_SKIP() << "this build contains no batch estimator";
+    }
   }
   /// Returns the JSON text of a comparison without the entries that contain times.
   static std::string WithoutClock(const std::string& json) {
@@ -66,13 +70,13 @@ TEST_F(CompareCli, AConfigIsRunAndItsErrorDecomposed) {
   const Outcome compared = Call({"compare", "config.yaml", "--all", "-o", "out"});
   EXPECT_EQ(compared.code, 0) << compared.err;
   for (const char* words :
-       {"added 'full_information'", "RMSD target.depth [mm]",
+       {"'full_information' was added", "RMSD target.depth [mm]",
         "Online: estimates that use only past data", "Smoothed: estimates that also use later data",
         "At the end, when all estimators have the same data",
         "linearisation, ekf compared with full_information", "smoothing, ekf compared with rts",
         "rejected measurements, batch_accepted compared with batch",
         "of 227 measurements were not used", "rmse target.depth [mm]", "CPU time [us/frame]",
-        "  of its initial filter", "ratios are from one run and have no confidence interval"}) {
+        "  of the initial filter", "ratios are from one run and have no confidence interval"}) {
     EXPECT_TRUE(Contains(compared.out, words)) << words << '\n' << compared.out;
   }
   const Config json = Json("out/compare.json"), run = Json("out/run.json");
@@ -88,8 +92,9 @@ TEST_F(CompareCli, AConfigIsRunAndItsErrorDecomposed) {
   EXPECT_TRUE(Contains(Read("out/compare.md"), "| rmse target.depth [mm] | "));
 }
 
-// The first run fails, and the second has no errors relative to truth. Neither can be compared.
-// Both are kept, and the program reports the reason.
+// Neither run can be compared: the first run fails, and the second run contains no truth, so it has
+// no errors relative to truth. The folders of both runs are retained, and the program reports the
+// reason.
 TEST_F(CompareCli, ARunThatCannotBeComparedIsKept) {
   const auto compare = [&](const std::string& rows, const std::string& folder) {
     Write("bad.csv", "t_s,d,z\n" + rows);
@@ -106,8 +111,8 @@ TEST_F(CompareCli, ARunThatCannotBeComparedIsKept) {
   EXPECT_TRUE(Contains(Read("blind/run.json"), "\"ok\""));
 }
 
-// `compare` prints the same values when it makes a run and when it reads the folder of this run.
-// The values include covariances.
+// `compare` prints the same values, including covariances, when it performs a run and when it reads
+// the folder of this run.
 TEST_F(CompareCli, TheFolderOfARunTellsTheSame) {
   ASSERT_EQ(Call({"compare", "config.yaml", "-o", "out", "--quiet"}).code, 0);
   const Outcome compared = Call({"compare", "out", "--json"});
@@ -138,7 +143,7 @@ TEST_F(CompareCli, OfSeveralFoldersEstimatorsAreNamedByTheirs) {
   EXPECT_TRUE(Contains(Call({"compare", ".", "../b"}).out, "  a/ekf"));
 }
 
-// Fault 86 of tests/faults/README.md.
+// Tests fault 86 of tests/faults/README.md.
 TEST_F(CompareCli, RefusesRunsOverDifferentData) {
   WriteTable("one.csv");
   WriteTable("other.csv", "86.25");
@@ -150,17 +155,18 @@ TEST_F(CompareCli, RefusesRunsOverDifferentData) {
   const Outcome compared = Call({"compare", "a", "b"});
   EXPECT_EQ(compared.code, 65);
   EXPECT_EQ(compared.out, "");
-  EXPECT_EQ(compared.err, "error: b: has other measurements than 'a': " + hash("b") + ", not " +
-                              hash("a") +
-                              ", first difference: t = 0.500000000 s; expected runs of the same "
-                              "source, seed and start\n");
+  EXPECT_EQ(compared.err, "error: b: the measurements differ from those of 'a': the SHA-256 is " +
+                              hash("b") + ", not " + hash("a") +
+                              "; the first difference is at t = 0.500000000 s; expected runs of "
+                              "the same source, seed and start\n");
   Write("a/measurements.csv", "t_s,stereo\n0.1\n0.1\n");
   const Outcome damaged = Call({"compare", "a", "b"});
   EXPECT_EQ(damaged.code, 65);
-  EXPECT_TRUE(Contains(damaged.err, "b: has other measurements than 'a'")) << damaged.err;
+  EXPECT_TRUE(Contains(damaged.err, "b: the measurements differ from those of 'a'")) << damaged.err;
 }
 
-// Fault 86 of tests/faults/README.md: the same numbers in a different notation are the same data.
+// Tests fault 86 of tests/faults/README.md: the same numbers in a different notation are the same
+// data.
 TEST_F(CompareCli, HashesWhatIsMeasuredNotItsText) {
   WriteTable("one.csv");
   WriteTable("other.csv", "+865e-1");
@@ -169,7 +175,7 @@ TEST_F(CompareCli, HashesWhatIsMeasuredNotItsText) {
   EXPECT_EQ(Call({"compare", "a", "b", "--reference", "a/ekf"}).code, 0);
 }
 
-// Fault 86 of tests/faults/README.md: the second run processed fewer data.
+// Tests fault 86 of tests/faults/README.md: the second run processed fewer data.
 TEST_F(CompareCli, TellsWhereARunEndsEarlier) {
   WriteTable("one.csv");
   Write("other.csv", Read("one.csv").substr(0, Read("one.csv").find("1.500000")));
@@ -177,8 +183,7 @@ TEST_F(CompareCli, TellsWhereARunEndsEarlier) {
   ASSERT_EQ(Table("other.csv", "b").code, 0);
   const Outcome compared = Call({"compare", "a", "b"});
   EXPECT_EQ(compared.code, 65);
-  EXPECT_TRUE(
-      Contains(compared.err, "first difference: the end of the file instead of t = 1.500000000 s"))
+  EXPECT_TRUE(Contains(compared.err, "the end of the file, the other file has t = 1.500000000 s"))
       << compared.err;
 }
 
@@ -213,35 +218,36 @@ TEST_F(CompareCli, RefusesASourceThatCanBeReadOnceForSeveralSeeds) {
   EXPECT_TRUE(Contains(compared.err, "can be read only once")) << compared.err;
 }
 
-// Fault 85 of tests/faults/README.md.
+// Tests fault 85 of tests/faults/README.md.
 TEST_F(CompareCli, WithholdsTheComparisonWhereTheBatchFailed) {
   const std::string failing = "estimators.batch={type: ceres_batch, max_iterations: 1}";
   const Outcome compared = Call({"compare", "config.yaml", "-o", "out", "--reference", "batch",
                                  "--no-decomposition", "--set", failing});
   EXPECT_EQ(compared.code, 1);
   const std::string words =
-      "no reference: estimator 'batch' failed, the comparison with it is withheld";
+      "no reference is available: estimator 'batch' failed, so the comparison with this "
+      "estimator is withheld";
   EXPECT_TRUE(Contains(compared.err, "error: " + words)) << compared.err;
   EXPECT_TRUE(Contains(compared.out, words)) << compared.out;
   EXPECT_FALSE(Contains(compared.out, "difference target")) << compared.out;
-  // Errors relative to truth need no batch, so they are shown. The comparison with the batch is
-  // withheld.
+  // Errors relative to truth do not need the batch, so they are printed. The comparison with the
+  // batch is withheld.
   const Outcome truth =
       Call({"compare", "config.yaml", "-o", "two", "--no-decomposition", "--set", failing});
   EXPECT_EQ(truth.code, 1);
   EXPECT_TRUE(Contains(truth.out, "rmse target.depth [mm]")) << truth.out;
-  // There is no gate, so the batch of the accepted measurements uses all measurements. It replaces
-  // the batch that failed.
+  // There is no gate, so the batch of the accepted measurements uses all measurements. This batch
+  // replaces the batch that failed.
   const Outcome added = Call({"compare", "config.yaml", "-o", "three", "--set", failing});
-  EXPECT_EQ(added.code, 79) << "that of the run";
+  EXPECT_EQ(added.code, 79) << "expected the exit code of the run";
   EXPECT_FALSE(Contains(added.out, words)) << added.out;
   EXPECT_TRUE(Contains(added.out, "to batch_accepted")) << added.out;
   // `compare` on the finished folder exits with the same code.
   EXPECT_EQ(Call({"compare", "out", "--reference", "batch"}).code, 1);
 }
 
-// Fault 85 of tests/faults/README.md: if several folders are compared, one of them must have a
-// batch. It may be any of them.
+// Tests fault 85 of tests/faults/README.md: if several folders are compared, the batch of any one
+// of them is sufficient.
 TEST_F(CompareCli, TheBatchOfAnotherFolderServesWhereOneFailed) {
   const auto run = [this](const std::string& folder, const std::string& batch) {
     return Call({"run", "config.yaml", "-o", folder, "--no-figures", "--quiet", "--covariances",
@@ -257,8 +263,7 @@ TEST_F(CompareCli, TheBatchOfAnotherFolderServesWhereOneFailed) {
   }
 }
 
-// A fixed-lag smoother relinearises. Each of its estimates uses the data up to the end of its
-// window.
+// A fixed-lag smoother relinearises. Each estimate uses the data up to the end of the window.
 TEST_F(CompareCli, AWindowIsNeitherAFilterNorASmootherOfAllData) {
   const std::string window = "estimators.window={type: fixed_lag, lag_s: 0.5";
   const Outcome smoothed =
@@ -297,18 +302,19 @@ TEST_F(CompareCli, ExitsWithTheCodeOfARunThatFailed) {
   EXPECT_TRUE(Contains(compared.err, "table.csv:6:10 d: 'no_number' is not a number"))
       << compared.err;
   EXPECT_EQ(Json("out/compare.json").root().At("status").Text(), "failed");
-  EXPECT_EQ(Call({"compare", "out"}).code, 1) << "no batch came to its end";
+  EXPECT_EQ(Call({"compare", "out"}).code, 1) << "no batch has finished";
 }
 
-// `compare` reports the rejection recovery when it makes the run and when it reads its folder.
+// `compare` reports the rejection recovery when it performs the run and when it reads the run's
+// folder.
 TEST_F(CompareCli, TellsOfRejectionRecovery) {
   WriteTable("table.csv");
   std::string text = Read("table.csv");
   for (int k = 21; k <= 50; ++k) text += std::to_string(0.1 * k) + ",26\n";
   Write("table.csv", text);
   const std::string words =
-      "'ekf' recovered from rejections: the steps to a batch or smoother include the cost of the "
-      "recovery";
+      "'ekf' recovered from consecutive rejections: the steps to a batch or smoother include the "
+      "cost of this recovery";
   const Outcome compared =
       Call({"compare", "table.yaml", "-o", "out", "--set",
             "estimators.ekf={type: ekf, gate: 0.99, rejection_recovery: {after: 2}}"});
@@ -346,7 +352,7 @@ TEST_F(CompareCli, OverSeedsValuesHaveASpread) {
   const Node anees = estimators.At("ekf").At("anees").At("target");
   EXPECT_EQ(anees.At("timestamps").Number(), 61);
   EXPECT_EQ(std::ssize(anees.At("mean").Items()), 61);
-  // Tabulated bounds of chi-square with six degrees of freedom: 1.237 and 14.449.
+  // The tabulated bounds of chi-square with six degrees of freedom are 1.237 and 14.449.
   EXPECT_NEAR(anees.At("low").Items()[0].Number(), 1.237 / 6.0, 1e-3);
   EXPECT_NEAR(anees.At("high").Items()[0].Number(), 14.449 / 6.0, 1e-3);
   ASSERT_EQ(Call(compare("2", "two")).code, 0);
@@ -430,7 +436,7 @@ TEST_F(CompareCli, BeginsNoRunBeyondTheBudget) {
             "--budget", "0.01", "--set", "source.duration_s=2", "-o", "out"});
   EXPECT_EQ(compared.code, 0) << compared.err;
   const std::string words =
-      "the budget of 0.01 s sufficed for 1 of 5 runs; not run: seed 12 and later seeds";
+      "the budget of 0.01 s sufficed for 1 of 5 runs; seed 12 and the later seeds were not run";
   EXPECT_TRUE(Contains(compared.out, words)) << compared.out;
   const Config json = Json("out/compare.json");
   EXPECT_EQ(json.root().At("runs").Number(), 1);
@@ -440,12 +446,11 @@ TEST_F(CompareCli, BeginsNoRunBeyondTheBudget) {
 TEST_F(CompareCli, AddsNothingBeyondTheBudget) {
   const Outcome little = Call({"compare", "config.yaml", "--budget", "1e-9", "-o", "little"});
   EXPECT_EQ(little.code, 0) << little.err;
-  EXPECT_TRUE(Contains(little.out, "predicted from 10 of 152 frames: ")) << little.out;
-  EXPECT_TRUE(Contains(little.out, " s, the budget is 1e-09 s")) << little.out;
-  EXPECT_FALSE(Contains(little.out, "added '")) << little.out;
+  EXPECT_TRUE(Contains(little.out, ", from the first 10 of 152 frames")) << little.out;
+  EXPECT_TRUE(Contains(little.out, " s; the budget is 1e-09 s")) << little.out;
+  EXPECT_FALSE(Contains(little.out, "was added")) << little.out;
   const std::string shown = little.out.substr(little.out.find("Error decomposition"));
-  EXPECT_TRUE(
-      Contains(shown, "the budget of 1e-09 s excludes the estimators that are listed as left out"))
+  EXPECT_TRUE(Contains(shown, "the budget of 1e-09 s excludes some of the omitted estimators"))
       << shown;
   const Outcome much = Call({"compare", "config.yaml", "--budget", "1e6", "-o", "much"});
   ASSERT_EQ(much.code, 0) << much.err;
@@ -480,19 +485,22 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "a", "--no-figures"}).code, 0);
   fails({"compare"}, 2, "CONFIG | DIR is required");
   fails({"compare", "a", "config.yaml"}, 2, "'config.yaml' is not a folder");
-  fails({"compare", "a", "--runs", "3"}, 2, "not supported for finished runs");
-  fails({"compare", "a", "--reference", "bath"}, 2, "no estimator 'bath'; expected one of ekf");
+  fails({"compare", "a", "--runs", "3"}, 2, "finished runs do not support this option");
+  fails({"compare", "a", "--reference", "bath"}, 2,
+        "no estimator has the name 'bath'; expected one of ekf");
   fails({"compare", "config.yaml", "--reference", "turth"}, 2, "did you mean 'truth'");
-  fails({"compare", "a", "./a/"}, 2, "./a/: is given twice; expected folders of different runs");
-  fails({"compare", "a", "--filter", "rts"}, 2, "no estimator 'rts'; expected one of ekf");
+  fails({"compare", "a", "./a/"}, 2,
+        "./a/: this folder is given twice; expected folders of different runs");
+  fails({"compare", "a", "--filter", "rts"}, 2,
+        "no estimator has the name 'rts'; expected one of ekf");
   fails({"compare", "nowhere"}, 66, "nowhere");
-  fails({"compare", "."}, 66, "run.json: cannot be read");
+  fails({"compare", "."}, 66, "run.json: the file cannot be read");
   fs::create_directory(folder_ / "swept");
   Write("swept/sweep.json", "{}");
-  fails({"compare", "swept"}, 65, "swept: is the folder of a sweep; expected folders that");
+  fails({"compare", "swept"}, 65, "swept: this is the folder of a sweep; expected folders that");
   fs::create_directory(folder_ / "run.partial");
   Write("run.partial/run.json", "{\"status\": \"running\"}");
-  fails({"compare", "run.partial"}, 65, "run.partial: is incomplete; expected a ");
+  fails({"compare", "run.partial"}, 65, "run.partial: the run is not finished; expected a ");
   fails({"compare", "config.yaml", "-o", "a"}, 73, "exists already");
   fails({"compare", "config.yaml", "--first-seed", "3"}, 2, "--first-seed requires --runs");
   fails({"compare", "config.yaml", "--jobs", "3"}, 2, "--jobs requires --runs");
@@ -500,21 +508,22 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
     fails({"compare", "config.yaml", "--budget", budget}, 2,
           "--budget: '" + std::string(budget) + "' is not a number from 1e-09 to 1e+09");
   }
-  fails({"compare", "a", "--budget", "3"}, 2, "not supported for finished runs");
+  fails({"compare", "a", "--budget", "3"}, 2, "finished runs do not support this option");
   fails({"compare", "config.yaml", "--runs", "2", "--seed", "7", "--first-seed", "20"}, 2,
         "--first-seed");
   fails({"compare", "a", "--json", "--markdown"}, 2, "--json");
   fails({"compare", "a", "--latex", "--json"}, 2, "--json");
   fails({"compare", "a", "--latex", "--markdown"}, 2, "--markdown");
-  fails({"compare", "a", "-o", "a", "--force"}, 73, "a: is the input 'a'; expected another folder");
-  fails({"compare", "a", "-o", ".", "--force"}, 73, ".: contains the input 'a'");
+  fails({"compare", "a", "-o", "a", "--force"}, 73,
+        "a: the folder is the input 'a'; expected another folder");
+  fails({"compare", "a", "-o", ".", "--force"}, 73, ".: the folder contains the input 'a'");
   EXPECT_TRUE(Exists("a/ekf/estimates.csv"));
   fails({"compare", "config.yaml", "--runs", "2", "--figures"}, 2, "--figures");
   const std::string whole = Read("a/ekf/estimates.csv");
   const std::size_t last = whole.rfind('\n', whole.size() - 2) + 1;
   Write("a/ekf/estimates.csv", whole.substr(0, last));
   fails({"compare", "a"}, 65,
-        "estimates.csv: has 151 rows, but run.json records 152; expected an unmodified run folder");
+        "estimates.csv: the file has 151 rows, but run.json records 152 rows; expected an");
   Write("a/ekf/estimates.csv", whole.substr(0, whole.size() - 1));
   fails({"compare", "a"}, 65, "estimates.csv:153: the last line is incomplete");
   for (const auto& [stamp, words] : {std::pair("", "t_s '' is not a number"),
@@ -532,10 +541,10 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
     const std::string kept = there ? Read(std::string("a/") + name) : "";
     fs::remove(folder_ / "a" / name);
     fs::create_directory(folder_ / "a" / name);
-    fails({"compare", "a"}, 65, std::string(name) + ": is not a regular file");
+    fails({"compare", "a"}, 65, std::string(name) + ": this is not a regular file");
     fs::remove(folder_ / "a" / name);
     ASSERT_EQ(::mkfifo((folder_ / "a" / name).c_str(), 0600), 0);
-    fails({"compare", "a"}, 65, std::string(name) + ": is not a regular file");
+    fails({"compare", "a"}, 65, std::string(name) + ": this is not a regular file");
     fs::remove(folder_ / "a" / name);
     if (there) Write(std::string("a/") + name, kept);
   }
@@ -544,7 +553,7 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
     Write("a/run.json", std::regex_replace(json, std::regex(text), other));
   };
   with("\"data\"", "\"date\"");
-  fails({"compare", "a"}, 65, "does not record the hashes of the data");
+  fails({"compare", "a"}, 65, "the hashes of the data are missing");
   with("\"frames\": 152", "\"frames\": \"many\"");
   fails({"compare", "a"}, 65, "a/run.json frames: \"many\"; expected a whole number from 0 to");
   with("\"rows\": 152", "\"rows\": -152");

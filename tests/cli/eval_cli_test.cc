@@ -16,7 +16,7 @@ using testing::Contains;
 using testing::Outcome;
 using Cli = testing::ProgramTest;
 
-/// Returns poses on a half circle of radius `radius`, one every 0.1 s from `t0` on.
+/// Returns poses on a half circle of radius `radius`, one pose every 0.1 s, beginning at `t0`.
 std::string HalfCircle(double radius, double t0 = 0.0) {
   std::string text = "# t x y z qx qy qz qw\n";
   for (int i = 0; i <= 30; ++i) {
@@ -86,8 +86,8 @@ TEST_F(EvalCli, FlagsOfEvoMeanWhatTheyMeanInEvo) {
   const Outcome alone = Call({"eval", "truth.tum"});
   EXPECT_EQ(alone.code, 2);
   EXPECT_EQ(alone.err,
-            "error: truth.tum: a single file cannot be evaluated; expected REF EST, or the "
-            "folder of a run\nsee `alidade eval --help`\n");
+            "error: truth.tum: a single file cannot be evaluated; expected two files REF EST, or "
+            "the folder of a run\nsee `alidade eval --help`\n");
 }
 
 TEST_F(EvalCli, EachOptionOfEvoIsTakenWithUnderscoresAndWithHyphens) {
@@ -123,11 +123,12 @@ TEST_F(EvalCli, EachOptionOfEvoIsTakenWithUnderscoresAndWithHyphens) {
   EXPECT_EQ(one.At("pairs").At("delta").Number(), 2.0);
 }
 
-/// Calculated by hand. The reference has the times 0, 1, 2, 3 at x = 0, 1, 2, 3. The estimate has
-/// the times 0, 1, 1, 2 at x = 0, 1, 1.5, 2. The pairs of x are (0, 0), (1, 1), (1, 1.5), (2, 2).
+/// The expected values are computed by hand. The reference has the times 0, 1, 2, 3 at x = 0, 1, 2,
+/// 3. The estimate has the times 0, 1, 1, 2 at x = 0, 1, 1.5, 2. The pairs of x are (0, 0), (1, 1),
+/// (1, 1.5), (2, 2).
 ///
-///   ATE errors 0, 0, 0.5, 0                                   rmse 0.25
-///   RPE of steps 1, 0, 1 against 1, 0.5, 0.5: 0, 0.5, 0.5     rmse sqrt(0.5 / 3)
+///   ATE errors 0, 0, 0.5, 0                                         rmse 0.25
+///   RPE of steps 1, 0, 1 compared with 1, 0.5, 0.5: 0, 0.5, 0.5     rmse sqrt(0.5 / 3)
 TEST_F(EvalCli, BothPosesOfADuplicateTimestampCountAsInEvo) {
   Write("ref.tum", "0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n");
   Write("est.tum", "0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n1 1.5 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n");
@@ -137,8 +138,8 @@ TEST_F(EvalCli, BothPosesOfADuplicateTimestampCountAsInEvo) {
   EXPECT_DOUBLE_EQ(one.At("ate").At("trans_part").At("rmse").Number(), 0.25);
   EXPECT_DOUBLE_EQ(one.At("rpe").At("trans_part").At("rmse").Number(), std::sqrt(0.5 / 3.0));
   EXPECT_EQ(Call({"eval", "ref.tum", "est.tum"}).err,
-            "warning: est.tum:3 t: duplicate timestamp 1.000000 s; expected each timestamp once; "
-            "all poses are kept\n");
+            "warning: est.tum:3 t: 1.000000 s is a duplicate timestamp; expected each timestamp "
+            "once; all poses are retained\n");
 }
 
 TEST_F(EvalCli, TwoFilesOfKittiGoByTheTimesBesideThem) {
@@ -160,9 +161,8 @@ TEST_F(EvalCli, SwappedFilesAreToldOf) {
   const Outcome swapped = Call({"eval", "mono.tum", "truth.tum", "-as"});
   EXPECT_EQ(swapped.code, 0);
   EXPECT_EQ(swapped.err,
-            "warning: truth.tum: is named like ground truth, but is used as the estimate; the "
-            "reference is mono.tum; "
-            "expected REF first, then EST\n");
+            "warning: truth.tum: the file is named like ground truth, but is used as the estimate; "
+            "the reference is mono.tum; expected REF first, then EST\n");
 }
 
 TEST_F(EvalCli, WarningsGoToStandardErrorAndFiguresToStandardOutput) {
@@ -199,14 +199,14 @@ TEST_F(EvalCli, BadInputIsRefusedWithItsPlace) {
   EXPECT_EQ(bad.code, 65);
   EXPECT_EQ(bad.err, "error: bad.tum:2:13 qz: 'nan' is not finite; expected a finite number\n");
   EXPECT_EQ(Call({"eval", "truth.tum", "missing.tum"}).code, 66);
-  EXPECT_EQ(Call({"eval", ".", "mono.tum"}).code, 0);  // uses the truth.tum of the folder
+  EXPECT_EQ(Call({"eval", ".", "mono.tum"}).code, 0);  // uses truth.tum of the folder
   const Outcome none = Call({"eval", "truth.tum", "."});
   EXPECT_EQ(none.code, 66);
-  EXPECT_TRUE(none.err.starts_with("error: .: no trajectory in this folder; expected NAME/"))
+  EXPECT_TRUE(none.err.starts_with("error: .: this folder does not contain a trajectory; expected"))
       << none.err;
 }
 
-// Fault 91 of tests/faults/README.md.
+// Tests fault 91 of tests/faults/README.md.
 TEST_F(EvalCli, ATornLastRowOfAnUnfinishedRunIsIgnored) {
   const std::string whole = HalfCircle(2.0);
   const std::string torn = whole.substr(0, whole.size() - 5);
@@ -217,7 +217,8 @@ TEST_F(EvalCli, ATornLastRowOfAnUnfinishedRunIsIgnored) {
   }
   const Config json = Evaluated({"killed.partial"});
   EXPECT_EQ(json.root().At("evaluations").Items().front().At("matched").Number(), 30);
-  EXPECT_EQ(Call({"eval", "copied"}).code, 65) << "a file of a user's is whole or wrong";
+  EXPECT_EQ(Call({"eval", "copied"}).code, 65)
+      << "only the files of an unfinished run may have an incomplete last row";
 }
 
 TEST_F(EvalCli, SeveralEstimatesAreOneTable) {
@@ -247,7 +248,7 @@ TEST_F(EvalCli, AnEstimateThatFailsLeavesTheOthersTheirFigures) {
   const Outcome table = Call(markdown);
   EXPECT_EQ(table.code, 65);
   EXPECT_EQ(table.err,
-            "error: two.tum: 2 poses are too few for an alignment; expected 3 or more\n");
+            "error: two.tum: 2 poses are too few for an alignment; expected 3 or more poses\n");
   EXPECT_TRUE(Contains(table.out, "| two | failed | - | - | - | - | - | - | - |\n")) << table.out;
   EXPECT_TRUE(Contains(table.out, "| mono | se3 | 1.000000 | 31 of 31 |")) << table.out;
   EXPECT_TRUE(
@@ -260,7 +261,7 @@ TEST_F(EvalCli, AnEstimateThatFailsLeavesTheOthersTheirFigures) {
   const Node evaluations = parsed.root().At("evaluations");
   EXPECT_EQ(evaluations.Items()[0].At("estimate").Text(), "two");
   EXPECT_EQ(evaluations.Items()[0].At("error").Text(),
-            "two.tum: 2 poses are too few for an alignment; expected 3 or more");
+            "two.tum: 2 poses are too few for an alignment; expected 3 or more poses");
   EXPECT_TRUE(evaluations.Items()[1].At("ate").Find("trans_part"));
   EXPECT_FALSE(evaluations.Items()[1].Find("error"));
   // If the only estimate cannot be evaluated, the program prints no table.
@@ -330,7 +331,7 @@ TEST_F(EvalCli, OfARunSaysWhatTheRunSaid) {
   EXPECT_TRUE(Contains(aligned.out, "NEES withheld: the alignment by sim3 ")) << aligned.out;
 }
 
-/// A robot moves in the plane. Its position fixes have a known error.
+/// A robot moves in the plane. The position fixes have a known standard deviation.
 const std::string kPlanarConfig = R"(alidade: 1
 state:
   robot: {model: planar, input: {stream: odometry}, noise: {speed: 0.05, turn_rate: 0.05},
@@ -345,7 +346,8 @@ source:
 estimators: {ekf: {type: ekf}}
 )";
 
-/// Returns a table of a drive on a circle of radius 5 m at 1 m/s, for more than one turn.
+/// Returns a table of a drive at 1 m/s on a circle of radius 5 m. The drive covers more than one
+/// full circle.
 std::string PlanarDrive() {
   std::string text = "t_s,v,o,gx,gy,tx,ty,th\n";
   for (int i = 0; i <= 400; ++i) {

@@ -38,7 +38,7 @@ TEST_F(ExplainCli, TellsWhichTruthIsOfWhichBlock) {
   const Outcome stereo =
       Call({"explain", "config.yaml", "--set", "estimators.ekf.sensors=[stereo]"});
   EXPECT_EQ(stereo.code, 0) << stereo.err;
-  EXPECT_TRUE(Contains(stereo.out, "truth not used: inverse_distance, no block has this name\n"))
+  EXPECT_TRUE(Contains(stereo.out, "truth inverse_distance is not used: no block has this name\n"))
       << stereo.out;
   Write("table.csv", "t_s,d\n0,80\n");
   const Outcome some = Call({"explain", "table.yaml", "--set", "source.truth={depth_rate: d}"});
@@ -57,8 +57,8 @@ TEST_F(ExplainCli, TellsWhichNoiseTheConfigGivesAsACovariance) {
   replace("baseline_m: 0.065, sigma_px: 1.0", "baseline_m: 0.065, covariance: [[2.25]]");
   Write("given.yaml", text);
   const Outcome given = Call({"explain", "given.yaml"});
-  for (const char* line : {"    noise of target: the covariance of the config, sigma 0.5\n",
-                           "    noise of stereo: the covariance of the config, sigma 1.5\n"}) {
+  for (const char* line : {"    noise of target: covariance from the config, with sigma 0.5\n",
+                           "    noise of stereo: covariance from the config, with sigma 1.5\n"}) {
     EXPECT_TRUE(Contains(given.out, line)) << given.out << given.err;
   }
 }
@@ -99,11 +99,13 @@ TEST_F(ExplainCli, TellsWhatAFixedBlockIs) {
   EXPECT_FALSE(Contains(one.out, "no effect for")) << one.out;
   const Outcome considered =
       Call({"explain", "config.yaml", "--set", "state.target.consider=[depth]"});
-  EXPECT_TRUE(Contains(considered.out, "of a sensor; no effect for stereo\n")) << considered.out;
+  EXPECT_TRUE(Contains(considered.out, "for sensors that do not correct a block: stereo\n"))
+      << considered.out;
   // All blocks of the stereo sensor are constant.
   const Outcome all =
       Call({"explain", "config.yaml", "--set", "state.target.constant=[depth, depth_rate]"});
-  EXPECT_TRUE(Contains(all.out, "rejections of a sensor; no effect for stereo\n")) << all.out;
+  EXPECT_TRUE(Contains(all.out, "; no effect for sensors that do not correct a block: stereo\n"))
+      << all.out;
 }
 
 }  // namespace

@@ -31,9 +31,10 @@ TEST_F(LogCli, OptionQuietAndEnvironmentSetTheLevel) {
     EXPECT_EQ(Contains(run.err, "info: source: streams disparity, disparity_all, "), info)
         << run.err;
     EXPECT_EQ(Contains(run.err, "debug: plugin loaded: "), debug) << run.err;
-    EXPECT_EQ(Contains(run.err, "debug: ekf: "), debug) << run.err;  // has the run time
+    EXPECT_EQ(Contains(run.err, "debug: ekf: "), debug) << run.err;  // contains the run time
     EXPECT_EQ(run.err.empty(), !info) << run.err;
-    EXPECT_FALSE(Contains(run.err, "\033[")) << "colour goes to a terminal alone";
+    EXPECT_FALSE(Contains(run.err, "\033["))
+        << "colour is printed only if standard error is a terminal";
   };
   has({}, false, false);
   has({"--log-level", "info"}, true, false);
@@ -48,7 +49,7 @@ TEST_F(LogCli, OptionQuietAndEnvironmentSetTheLevel) {
 
 TEST_F(LogCli, AnUnknownLevelIsAUsageError) {
   const std::string what =
-      "'loud' is not a level; expected trace, debug, info, warning, error, off";
+      "'loud' is not a log level; expected one of trace, debug, info, warning, error, off";
   const Outcome option = Call({"doctor", "--log-level", "loud"});
   EXPECT_EQ(option.code, 2);
   EXPECT_EQ(option.err, "error: --log-level: " + what + "\nsee `alidade doctor --help`\n");
@@ -78,8 +79,8 @@ TEST_F(LogCli, EveryCommandTakesALevel) {
   }
 }
 
-// log.txt contains no messages below the level info, no clock time and no path. So it is identical
-// for another output folder and another level of the terminal.
+// log.txt contains no messages below the level info, no clock time and no path. The file is
+// therefore identical for every output folder and every log level of the terminal.
 TEST_F(LogCli, TheLogOfARunHasTheSameBytes) {
   const auto into = [&](const std::string& folder, const Arguments& more) {
     Arguments all = Diverging({"run", "config.yaml", "--no-figures", "-o", folder});
@@ -99,8 +100,8 @@ TEST_F(LogCli, TheLogOfARunHasTheSameBytes) {
   EXPECT_TRUE(Contains(Read("one/files.txt"), "log.txt\n"));
 }
 
-// A divergence is printed as a warning when it happens. If it ends the run, only the error is
-// printed.
+// A divergence is printed as a warning when it occurs. If the divergence ends the run, only the
+// error is printed.
 TEST_F(LogCli, ADivergenceIsAWarningOrTheErrorThatEndsTheRun) {
   const Outcome reported = Call(Diverging(Run({})));
   EXPECT_EQ(reported.code, 0) << reported.err;
@@ -112,7 +113,8 @@ TEST_F(LogCli, ADivergenceIsAWarningOrTheErrorThatEndsTheRun) {
   EXPECT_EQ(Call(Diverging(Run({"--quiet"}))).err, "");
 }
 
-// In a sweep a divergence is not a warning. It is a message of the level info and names the seed.
+// In a sweep, a divergence causes a message of the level info instead of a warning. This message
+// names the seed.
 TEST_F(LogCli, ASweepNamesTheRunOfAMessage) {
   const Outcome quiet = Call(Diverging({"sweep", "config.yaml", "--runs", "2", "-o", "a"}));
   EXPECT_FALSE(Contains(quiet.err, "warning: ")) << quiet.err;

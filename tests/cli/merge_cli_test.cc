@@ -66,7 +66,8 @@ TEST_F(MergeCli, ShardsOfAVariedSweepGiveItsBytesAndFigure) {
   ExpectSameFiles(folder_ / "merged", folder_ / "whole");
 }
 
-// One estimator starts from a diverged state. Its runs have no metrics but are counted.
+// One estimator starts from a diverged state. The runs of this estimator have no metrics but are
+// counted.
 TEST_F(MergeCli, KeepsRunsThatDiverged) {
   SweepAll(Diverging({}));
   EXPECT_EQ(Merge({"s1", "s2", "s3"}).code, 0) << Read("stderr");
@@ -89,21 +90,21 @@ TEST_F(MergeCli, RefusesShardsThatAreMissingOrComeTwice) {
   SweepAll();
   ExpectRefused({"s1", "s3"}, "error: shards are missing: 2/3");
   ExpectRefused({"s2"}, "error: shards are missing: 1/3, 3/3");
-  ExpectRefused({"s1", "s2", "s3", "./s2"}, "error: ./s2: is shard 2/3, which is given twice");
-  ExpectRefused({"s1", "s2", "s4"}, "s4/inputs.json: cannot be read", 66);
+  ExpectRefused({"s1", "s2", "s3", "./s2"}, "error: ./s2: shard 2/3 is given twice");
+  ExpectRefused({"s1", "s2", "s4"}, "s4/inputs.json: the file cannot be read", 66);
   EXPECT_EQ(Merge({}).code, 2);
-  EXPECT_EQ(Call({"merge", "s1"}).code, 2) << "no --output";
+  EXPECT_EQ(Call({"merge", "s1"}).code, 2) << "--output is required";
 }
 
 TEST_F(MergeCli, RefusesShardsOfAnotherSweep) {
   ASSERT_EQ(Sweep("s1", "1/2").code, 0);
   ASSERT_EQ(Sweep("of_three", "2/3").code, 0);
-  ExpectRefused({"s1", "of_three"}, "of_three: is shard 2/3, but s1 is shard 1/2");
+  ExpectRefused({"s1", "of_three"}, "of_three: this is shard 2/3, but s1 is shard 1/2");
   ASSERT_EQ(Sweep("config", "2/2", {"--set", "sensors.stereo.sigma_px=2"}).code, 0);
   ExpectRefused(
       {"s1", "config"},
-      "config: belongs to another sweep than s1: config.resolved.yaml:34: now 'sigma_px: 2', was "
-      "'sigma_px: 1.0'");
+      "config: the shard belongs to another sweep than s1: config.resolved.yaml:34: now 'sigma_px: "
+      "2', was 'sigma_px: 1.0'");
   ASSERT_EQ(Sweep("varied", "2/2", {"--vary", "sensors.stereo.sigma_px=2"}).code, 0);
   ExpectRefused({"s1", "varied"}, "command: now 'sweep --runs 7 --first-seed 5 --vary ");
   runs_ = "8";
@@ -119,22 +120,25 @@ TEST_F(MergeCli, RefusesShardsOfAnotherSweep) {
   ASSERT_NE(id, inputs.npos) << inputs;
   inputs[id + 12] = inputs[id + 12] == '0' ? '1' : '0';
   Write("s2/inputs.json", inputs);
-  ExpectRefused({"s1", "s2"}, "s2: belongs to another sweep than s1: build of program: now ");
+  ExpectRefused({"s1", "s2"},
+                "s2: the shard belongs to another sweep than s1: build of program: now ");
 }
 
 TEST_F(MergeCli, RefusesShardsOfOtherKernels) {
   ASSERT_EQ(Sweep("s1", "1/2").code, 0);
   if (Contains(Read("s1/inputs.json"), "\"kernels\": \"baseline\"")) {
-    GTEST_SKIP() << "this processor has no others";
+    GTEST_SKIP() << "this processor supports only the baseline kernels";
   }
   before_ = "export ALIDADE_KERNELS=baseline";
   ASSERT_EQ(Sweep("s2", "2/2").code, 0);
   ExpectRefused({"s1", "s2"},
-                "s2: belongs to another sweep than s1: kernels: now 'baseline', was ");
+                "s2: the shard belongs to another sweep than s1: kernels: now 'baseline', was ");
   before_ = "export ALIDADE_KERNELS=none";
   const Outcome none = Sweep("s3", "2/2");
   EXPECT_EQ(none.code, 2);
-  EXPECT_TRUE(Contains(none.err, "environment variable ALIDADE_KERNELS: 'none' is not available"))
+  EXPECT_TRUE(Contains(none.err,
+                       "environment variable ALIDADE_KERNELS: the instruction set 'none' is not "
+                       "available"))
       << none.err;
   EXPECT_FALSE(Exists("s3"));
 }
@@ -142,25 +146,26 @@ TEST_F(MergeCli, RefusesShardsOfOtherKernels) {
 TEST_F(MergeCli, RefusesWhatIsNoFinishedShard) {
   ASSERT_EQ(Sweep("s1", "1/2").code, 0);
   ASSERT_EQ(Sweep("whole", "").code, 0);
-  ExpectRefused({"s1", "whole"}, "whole/inputs.json: is not the inputs.json of a shard");
+  ExpectRefused({"s1", "whole"}, "whole/inputs.json: this is not the inputs.json of a shard");
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "run", "--no-figures"}).code, 0);
-  ExpectRefused({"run", "s1"}, "run/inputs.json: is not the inputs.json of a shard");
+  ExpectRefused({"run", "s1"}, "run/inputs.json: this is not the inputs.json of a shard");
   ASSERT_EQ(Sweep("s2", "2/2").code, 0);
   const std::string runs = Read("s2/finished_runs.jsonl"), summary = Read("s2/sweep.json");
-  // finished_runs.jsonl of a shard has a truncated last line, then a missing line, then a surplus
-  // line.
+  // The test damages finished_runs.jsonl of a shard in three ways: a truncated last line, a missing
+  // line, and a surplus line.
   Write("s2/finished_runs.jsonl", runs.substr(0, runs.size() - 9));
-  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:4: is not the run of seed 11");
+  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:4: the line is not the run of seed 11");
   Write("s2/finished_runs.jsonl", runs.substr(runs.find('\n') + 1));
-  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:1: is not the run of seed 8");
+  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:1: the line is not the run of seed 8");
   Write("s2/finished_runs.jsonl", runs + runs);
-  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:4: is a line after the last run");
+  ExpectRefused({"s1", "s2"},
+                "s2/finished_runs.jsonl:4: the file contains a line after the last run");
   fs::remove(folder_ / "s2/finished_runs.jsonl");
-  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl: cannot be read", 66);
+  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl: the file cannot be read", 66);
   std::string stopped = summary;
   stopped.replace(stopped.find("\"ok\""), 4, "\"stopped\"");
   Write("s2/sweep.json", stopped);
-  ExpectRefused({"s1", "s2"}, "s2: was stopped before it finished");
+  ExpectRefused({"s1", "s2"}, "s2: the run or sweep was stopped before it finished");
 }
 
 TEST_F(MergeCli, ReplacesItsFolderOnlyByForceAndNeverAShard) {
@@ -171,7 +176,7 @@ TEST_F(MergeCli, ReplacesItsFolderOnlyByForceAndNeverAShard) {
   EXPECT_EQ(Call({"merge", "s1", "-o", "s1", "--force"}).code, 73);
 }
 
-// A shard that was stopped and resumed gives the same files as an uninterrupted one.
+// A shard that was stopped and resumed gives the same files as an uninterrupted shard.
 TEST_F(MergeCli, AShardThatWasResumedMergesAsAnyOther) {
   runs_ = "40";
   const Arguments longer = {"--set", "source.duration_s=100"};
@@ -184,8 +189,10 @@ TEST_F(MergeCli, AShardThatWasResumedMergesAsAnyOther) {
   ASSERT_TRUE(Eventually([&] { return Contains(Read(path), "\n"); }));
   ::kill(process, SIGTERM);
   ASSERT_EQ(Wait(process).code, 75) << Read("stderr");
-  ExpectRefused({"s1", "s3", "s4.partial"}, "s4.partial: was stopped before it finished");
-  ExpectRefused({"s1", "s3", "s4"}, "error: s4: is not finished: its files are in s4.partial");
+  ExpectRefused({"s1", "s3", "s4.partial"},
+                "s4.partial: the run or sweep was stopped before it finished");
+  ExpectRefused({"s1", "s3", "s4"},
+                "error: s4: the sweep is not finished: its files are in s4.partial");
   ASSERT_EQ(Call(again).code, 0) << Read("stderr");
   EXPECT_EQ(Merge({"s1", "s3", "s4"}).code, 0) << Read("stderr");
   ExpectSameFiles(folder_ / "merged", folder_ / "whole");

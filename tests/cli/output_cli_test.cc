@@ -50,9 +50,10 @@ TEST_F(OutputCli, OutputIsNotTheFolderOfAllRuns) {
   };
   const std::string holds = " is the folder that contains all runs; expected ";
   for (const std::string folder : {"runs", "./runs/", "runs/a/.."}) {
-    expect({"-o", folder, "--force"}, 73, folder + ':' + holds + "runs/NAME");
+    expect({"-o", folder, "--force"}, 73, folder + ": this" + holds + "runs/NAME");
   }
-  expect({"--set", "output=\"\""}, 78, "--set output: empty path; expected a name inside runs/");
+  expect({"--set", "output=\"\""}, 78,
+         "--set output: the path is empty; expected a name inside runs/");
   expect({"--set", "output=."}, 78, "--set output: '.'" + holds + "a name inside runs/");
   Write("config.yaml", "output: a/..\n" + testing::kDepthConfig);
   expect({}, 78, "config.yaml:1:9 output: 'a/..'" + holds + "a name inside runs/");
@@ -165,7 +166,7 @@ TEST_F(OutputCli, ASecondRunGoesToANumberedFolder) {
     EXPECT_TRUE(Exists("runs/" + name + "/run.json"));
   }
   EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "-o", "runs/own"}).code, 73);
-  // The folder of an incomplete run also occupies its name.
+  // The folder of an incomplete run also reserves the name of the run.
   fs::create_directory(folder_ / "runs/left.partial");
   EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "--set", "output=left"}).err,
             "runs/left.partial exists: the output is runs/left-2 (--force replaces "
@@ -188,8 +189,8 @@ TEST_F(OutputCli, ARefusedConfigNamesNoFolder) {
   }
 }
 
-// The first eight rows are selected in two rounds. The first round selects five rows, and the
-// second three: it ends before `accepted` of the second sensor.
+// The first eight rows are selected in two rounds. The first round selects five rows. The second
+// round selects three rows and ends before `accepted` of the second sensor.
 TEST_F(OutputCli, RunPrintsTenRowsAndAllOfThemIfAsked) {
   const auto labels = [](const std::string& out) {
     std::vector<std::string> found;

@@ -10,7 +10,9 @@ class PluginFailureCli : public ProgramTest {
  protected:
   void SetUp() override {
     ProgramTest::SetUp();
-    if (!fs::exists(Plugin("bad_models"))) GTEST_SKIP() << "built for test_plugins";
+    if (!fs::exists(Plugin("bad_models"))) {
+      GTEST_SKIP() << "this plugin is built only together with test_plugins";
+    }
     Write("rows.csv", "t_s,u,v\n0,1,1\n1,1,1\n");
   }
   static std::string Plugin(const std::string& name) {
@@ -18,7 +20,7 @@ class PluginFailureCli : public ProgramTest {
   }
 };
 
-// Fault 58 of tests/faults/README.md.
+// Tests fault 58 of tests/faults/README.md.
 TEST_F(PluginFailureCli, AnExceptionOfAPluginInCIsNamedAndNoEndOfTheProgram) {
   const std::string plugin = Plugin("raw_throws");
   Write("probe.yaml", R"(alidade: 1
@@ -59,11 +61,12 @@ estimators: {ekf: {type: ekf}}
   const Outcome created = run("sensors.bad.model", "throws_in_create");
   EXPECT_EQ(created.code, 69) << created.err;
   EXPECT_TRUE(Contains(created.err, "model 'throws_in_create' of plugin " + plugin +
-                                        " failed while being created: it threw: the dog ate it"))
+                                        " could not be created: it threw an exception: the "
+                                        "dog ate it"))
       << created.err;
   const Outcome destroyed = run("sensors.bad.model", "throws_in_destroy_too");
   EXPECT_EQ(destroyed.code, 0) << destroyed.err;
-  EXPECT_TRUE(Contains(destroyed.err, "warning: Destroy of model 'throws_in_destroy_too'"))
+  EXPECT_TRUE(Contains(destroyed.err, "warning: function destroy of model 'throws_in_destroy_too'"))
       << destroyed.err;
   const Outcome step =
       run("state.s",
@@ -73,7 +76,7 @@ estimators: {ekf: {type: ekf}}
       << step.err;
 }
 
-// Fault 58 of tests/faults/README.md.
+// Tests fault 58 of tests/faults/README.md.
 TEST_F(PluginFailureCli, ASensorThatFailsIsLeftOutOnceOrAltogetherOrEndsTheRun) {
   const std::string plugin = Plugin("bad_models");
   Write("bad.yaml", R"(alidade: 1

@@ -75,8 +75,8 @@ TEST_F(ReplayCli, MakesARunOfAConfigOfAnyNameAgain) {
   }
 }
 
-// The folder of the environment also contains a plugin that is refused. This is not an error in the
-// run or in the replay.
+// The plugin folder named by the environment variable also contains a plugin that is refused. This
+// refusal is not an error in the run or in the replay.
 TEST_F(ReplayCli, MakesARunWithThePluginsOfTheEnvironmentAgain) {
   fs::create_directory(folder_ / "own");
   fs::permissions(folder_ / "own", fs::perms::owner_all);
@@ -147,8 +147,10 @@ TEST_F(ReplayCli, NamesARowThatChanged) {
   const std::string out = ExpectDifferent();
   EXPECT_TRUE(Contains(out, "differs: out/ekf/estimates.csv:2:1: now '0.0")) << out;
   EXPECT_TRUE(Contains(out, "', was '7.7")) << out;
-  EXPECT_TRUE(Contains(out, "differs: out/truth.csv:154:1: now ends before this row\n")) << out;
-  EXPECT_TRUE(Contains(out, "differs: out/expected.csv: has been removed\n")) << out;
+  EXPECT_TRUE(Contains(out, "differs: out/truth.csv:154:1: the file now ends before this row\n"))
+      << out;
+  EXPECT_TRUE(Contains(out, "differs: out/expected.csv: the recorded file has been removed\n"))
+      << out;
   EXPECT_TRUE(Contains(out, "\nout: 3 of ")) << out;
   const Outcome replay = Call({"replay", "out", "--json"});
   EXPECT_EQ(replay.code, 1);
@@ -163,7 +165,8 @@ TEST_F(ReplayCli, NamesARowThatChanged) {
 TEST_F(ReplayCli, RefusesWhatCannotBeMadeAgain) {
   const Outcome none = Call({"replay", "out"});
   EXPECT_EQ(none.code, 66);
-  EXPECT_TRUE(none.err.starts_with("error: out/inputs.json: cannot be read: ")) << none.err;
+  EXPECT_TRUE(none.err.starts_with("error: out/inputs.json: the file cannot be read: "))
+      << none.err;
   WriteTable("80");
   before_ = "exec < table.csv";
   Make({"run", "table.yaml", "--no-figures", "--set", "source.path=-"});
@@ -178,12 +181,13 @@ TEST_F(ReplayCli, RefusesWhatCannotBeMadeAgain) {
   Write("out/run.json", record);
   const Outcome stopped = Call({"replay", "out"});
   EXPECT_EQ(stopped.code, 65);
-  EXPECT_TRUE(Contains(stopped.err, "error: out: was stopped before it finished")) << stopped.err;
+  EXPECT_TRUE(Contains(stopped.err, "error: out: the run or sweep was stopped")) << stopped.err;
   record.replace(record.find("\"stopped\""), 9, "\"running\"");
   Write("out/run.json", record);
   const Outcome unfinished = Call({"replay", "out"});
   EXPECT_EQ(unfinished.code, 65);
-  EXPECT_TRUE(Contains(unfinished.err, "error: out: is incomplete; expected ")) << unfinished.err;
+  EXPECT_TRUE(Contains(unfinished.err, "error: out: the run or sweep is not finished; expected "))
+      << unfinished.err;
   Write("out/inputs.json", "[1, 2]");
   EXPECT_EQ(Call({"replay", "out"}).code, 65);
 }

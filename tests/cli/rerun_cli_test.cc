@@ -28,7 +28,7 @@ class Rerun : public testing::ProgramTest {
     const Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
   }
-  /// Runs `config` from another folder and expects the same estimates as in `first`.
+  /// Runs `config` from another folder and expects the estimates of `first`.
   void ExpectSameFrom(const std::string& config, const std::string& first) {
     const fs::path before = folder_;
     fs::create_directory(folder_ / "elsewhere");

@@ -42,8 +42,9 @@ TEST_F(SimulateCli, WritesFilesThatSourceTracksReadsBack) {
   }
   EXPECT_EQ(Lines("data/timestamps.csv"), 21u);
   EXPECT_EQ(Lines("data/truth.tum"), 21u);
-  EXPECT_EQ(Lines("data/odometry.csv"), 20u);  // has no row after the last frame
-  EXPECT_TRUE(Read("data/tracks.csv").starts_with("frame,feature,dim,value\n0,")) << "header";
+  EXPECT_EQ(Lines("data/odometry.csv"), 20u);  // no row follows the last frame
+  EXPECT_TRUE(Read("data/tracks.csv").starts_with("frame,feature,dim,value\n0,"))
+      << "the first line must be the header";
   EXPECT_EQ(Json("data/calibration.yaml").root().At("camera").At("fx").Number(), 525.0);
 
   // Reading the data and writing them again gives the same bytes.
@@ -96,7 +97,7 @@ TEST_F(SimulateCli, NothingReplacesTheDataThatItReads) {
   for (const char* command : {"simulate", "run", "compare"}) {
     const Outcome over = Call({command, "again.yaml", "-o", "data", "--force"});
     EXPECT_EQ(over.code, 73) << command;
-    EXPECT_TRUE(over.err.starts_with("error: data: is the input '")) << over.err;
+    EXPECT_TRUE(over.err.starts_with("error: data: the folder is the input '")) << over.err;
   }
   EXPECT_EQ(Read("data/tracks.csv"), tracks);
   Write("lens.yaml",
@@ -105,7 +106,7 @@ TEST_F(SimulateCli, NothingReplacesTheDataThatItReads) {
   ASSERT_EQ(Call({"simulate", "again.yaml", "-o", "again"}).code, 0);
   const Outcome included = Call({"simulate", "lens.yaml", "-o", "data", "--force"});
   EXPECT_EQ(included.code, 73);
-  EXPECT_TRUE(Contains(included.err, "data: contains the input '")) << included.err;
+  EXPECT_TRUE(Contains(included.err, "data: the folder contains the input '")) << included.err;
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
   EXPECT_EQ(Call({"simulate", "out/config.resolved.yaml", "-o", "out", "--force"}).code, 73);
 }
@@ -140,8 +141,8 @@ TEST_F(SimulateCli, ACalibrationOfAStereoPairHasItsBaseline) {
   const Outcome made = Call({"simulate", "scene.yaml", "-o", "data"});
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_EQ(Json("data/calibration.yaml").root().At("camera").At("baseline_m").Number(), 0.2);
-  // A config can include the calibration, and the simulated data contain the same calibration
-  // again.
+  // A config can include the calibration. The data simulated from this config contain the same
+  // calibration.
   const Outcome explained =
       Call({"explain", ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml", "--set",
             "camera.baseline_m=0.2"});

@@ -16,7 +16,7 @@ using SweepCli = testing::ProgramTest;
 
 std::string Rows(const std::string& csv) { return csv.substr(csv.find('\n') + 1); }
 
-// Fault 97 of tests/faults/README.md.
+// Tests fault 97 of tests/faults/README.md.
 TEST_F(SweepCli, GivesTheSameBytesForAnyNumberOfJobs) {
   for (const std::string jobs : {"1", "2", "3"}) {
     const Outcome sweep =
@@ -26,7 +26,7 @@ TEST_F(SweepCli, GivesTheSameBytesForAnyNumberOfJobs) {
   }
 }
 
-// Only times differ: one entry of compare.json and one row of its tables.
+// Only run times differ: one entry of compare.json and one row of each table.
 TEST_F(SweepCli, AComparisonOverSeedsHasTheSameBytesForAnyNumberOfJobs) {
   const auto files = [&](const std::string& jobs) {
     const Outcome comparison = Call({"compare", "config.yaml", "--runs", "4", "--no-decomposition",
@@ -101,7 +101,8 @@ TEST_F(SweepCli, RefusesWhatIsNoShare) {
 TEST_F(SweepCli, EveryShareHasARun) {
   const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "2", "--shard", "1/3"});
   EXPECT_EQ(sweep.code, 2);
-  EXPECT_TRUE(Contains(sweep.err, "error: --shard: 3 shards of 2 runs; expected a run for each"))
+  EXPECT_TRUE(
+      Contains(sweep.err, "error: --shard: 3 shards of 2 runs; expected at least one run for each"))
       << sweep.err;
   EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "2", "--shard", "2/2"}).code, 0);
 }
@@ -244,12 +245,12 @@ TEST_F(SweepCli, ValuesMayBeMapsAndTheirFigureIsDrawn) {
   ASSERT_EQ(varied.code, 0) << varied.err;
   EXPECT_EQ(Json("out/sweep.json").root().At("values").Items().size(), 2u);
   const bool drawn = Exists("out/figures/vary.svg");
-  EXPECT_EQ(drawn, !Contains(varied.err, "no figure drawn: gnuplot is not installed"))
+  EXPECT_EQ(drawn, !Contains(varied.err, "no figure was drawn: gnuplot is not installed"))
       << varied.err;
   if (!drawn) GTEST_SKIP() << "gnuplot is not installed";
   const std::string figure = Read("out/figures/vary.svg");
   EXPECT_TRUE(Contains(figure, "rmse target.depth: mean, 5 % to 95 %")) << figure.substr(0, 2000);
-  EXPECT_TRUE(Contains(figure, "after: 5, action: none")) << "the axis has the values";
+  EXPECT_TRUE(Contains(figure, "after: 5, action: none")) << "the axis must show the swept values";
 }
 
 TEST_F(SweepCli, TheErrorOfTheMapIsInTablesAndFigure) {
@@ -293,7 +294,7 @@ TEST_F(SweepCli, SeveralKeysTakeEachValueAndTheReprojectionErrorOfEachIsACurve) 
   }
   EXPECT_EQ(found, rows);
   const bool drawn = Exists("out/figures/reprojection.svg");
-  EXPECT_EQ(drawn, !Contains(varied.err, "no figure drawn")) << varied.err;
+  EXPECT_EQ(drawn, !Contains(varied.err, "no figure was drawn")) << varied.err;
   EXPECT_EQ(drawn, Contains(varied.out, "out/figures/reprojection.svg")) << varied.out;
 }
 
@@ -379,13 +380,13 @@ TEST_F(SweepCli, EveryValueHasTheSameEstimators) {
   EXPECT_EQ(rmse(0, "b"), rmse(1, "a"));
 }
 
-/// Adds an estimator `bad` next to ekf. It diverges in every run.
+/// Adds an estimator `bad`, which diverges in every run.
 const Arguments kDiverging = {
     "--set",
     "estimators.bad={type: ekf, overrides: {state: {target: {initial: {depth: {mean: -0.2, sigma: "
     "0.1}, depth_rate: {mean: 0, sigma: 0.5}}}}}}"};
 
-// Fault 85 of tests/faults/README.md.
+// Tests fault 85 of tests/faults/README.md.
 TEST_F(SweepCli, TellsHowOftenTheReferenceWasWithheld) {
   Arguments arguments = {"sweep", "config.yaml", "--runs", "2",
                          "-o",    "out",         "--set",  "reference=bad"};
@@ -393,9 +394,10 @@ TEST_F(SweepCli, TellsHowOftenTheReferenceWasWithheld) {
   const Outcome sweep = Call(arguments);
   ASSERT_EQ(sweep.code, 0) << sweep.err;
   const std::string words =
-      "\nerrors are differences from estimator 'bad', which is not the truth: no coverage, no "
-      "NEES; "
-      "withheld in 2 of 2 runs, in which the reference failed, diverged or had no estimates\n";
+      "\nerrors are differences from estimator 'bad', not from truth; coverage and NEES are "
+      "not computed; "
+      "the errors are withheld in 2 of 2 runs, in which the reference failed, diverged or had no "
+      "estimates\n";
   EXPECT_TRUE(Contains(sweep.out, words)) << sweep.out;
   EXPECT_TRUE(Contains(Read("out/table.md"), words)) << Read("out/table.md");
   EXPECT_EQ(Json("out/sweep.json").root().At("withheld").Number(), 2);
@@ -417,12 +419,12 @@ TEST_F(SweepCli, AVariedReferenceIsNamedForEachValue) {
   for (const std::string& text : {sweep.out, Read("out/table.md")}) {
     EXPECT_TRUE(Contains(text, "\ntruth: errors are differences from truth\n")) << text;
     EXPECT_TRUE(Contains(text,
-                         "\nekf: errors are differences from estimator 'ekf', which is not "
-                         "the truth: no coverage, no NEES\n"))
+                         "\nekf: errors are differences from estimator 'ekf', not from "
+                         "truth; coverage and NEES are not computed\n"))
         << text;
-    EXPECT_TRUE(Contains(text, "; withheld in 1 of 1 runs")) << text;
+    EXPECT_TRUE(Contains(text, "; the errors are withheld in 1 of 1 runs")) << text;
   }
-  // If all values have the same reference, it is named only once.
+  // If all values have the same reference, the reference is named only once.
   arguments[7] = "sensors.stereo.sigma_px=1,2";
   arguments[5] = "one";
   arguments.insert(arguments.end(), {"--set", "reference=ekf"});
@@ -463,11 +465,11 @@ TEST_F(SweepCli, RefusesWhatCannotBeVaried) {
        "error: --vary sensors.stereo.sigma_pix: unknown key; did "
        "you mean 'sigma_px'?"},
       {"sensors.sterio.sigma_px=1,2",
-       "error: --vary sensors.sterio.sigma_px: no 'sensors.sterio' "
-       "in the config; expected a key of an existing map; did "
+       "error: --vary sensors.sterio.sigma_px: the config does not contain 'sensors.sterio'; "
+       "expected a key of an existing map; did "
        "you mean 'stereo'?"},
       {"sensors.stereo.sigma_px=1,-2", "error: --vary sensors.stereo.sigma_px: "},
-      {"source.seed=1,2", "error: --vary source.seed: every value is run with the same seeds"}};
+      {"source.seed=1,2", "error: --vary source.seed: the seed cannot be varied"}};
   for (const auto& [text, words] : unknown) {
     const Outcome sweep =
         Call({"sweep", "config.yaml", "--runs", "1", "-o", "out", "--vary", text});

@@ -30,7 +30,7 @@ class SweepResumeCli : public ProgramTest {
     const Outcome stopped = Wait(process);
     ASSERT_EQ(stopped.code, 75) << stopped.err;
     EXPECT_TRUE(Contains(stopped.err, " of ")) << stopped.err;
-    EXPECT_TRUE(Contains(stopped.err, " runs; --resume continues it\n")) << stopped.err;
+    EXPECT_TRUE(Contains(stopped.err, " runs; --resume continues the sweep\n")) << stopped.err;
     EXPECT_FALSE(Exists("out"));
   }
 };
@@ -49,7 +49,7 @@ TEST_F(SweepResumeCli, GoesOnToTheSameBytes) {
   EXPECT_FALSE(Exists("out.partial"));
   const Outcome again = Sweep("out", {"--resume"});
   EXPECT_EQ(again.code, 0);
-  EXPECT_EQ(again.err, "out is finished: nothing to resume\n");
+  EXPECT_EQ(again.err, "out is already finished\n");
 }
 
 TEST_F(SweepResumeCli, GoesOnWithVariedValues) {
@@ -62,7 +62,8 @@ TEST_F(SweepResumeCli, GoesOnWithVariedValues) {
   ExpectSameFiles(folder_ / "out", folder_ / "whole");
 }
 
-// The file ends with an incomplete line, as after a process was killed while writing it.
+// The file ends with an incomplete line, as if the process had been killed while it wrote this
+// line.
 TEST_F(SweepResumeCli, TakesFinishedRunsFromTheFile) {
   StopSweep({"--jobs", "1"});
   std::string text = Read("out.partial/finished_runs.jsonl");
@@ -79,7 +80,8 @@ TEST_F(SweepResumeCli, TakesFinishedRunsFromTheFile) {
 
 TEST_F(SweepResumeCli, StartsIfThereIsNothingToResume) {
   EXPECT_EQ(Sweep("out", {"--resume"}).code, 0) << Read("stderr");
-  EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "2", "--resume"}).code, 2) << "without -o";
+  EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "2", "--resume"}).code, 2)
+      << "--resume requires -o";
   EXPECT_EQ(Sweep("other", {"--resume", "--force"}).code, 2);
 }
 
@@ -91,7 +93,7 @@ TEST_F(SweepResumeCli, AFinishedOneWithFailuresHasItsExitCodeAgain) {
   ASSERT_TRUE(files.contains("failures.csv"));
   const Outcome again = Call(sweep);
   EXPECT_EQ(again.code, 1);
-  EXPECT_EQ(again.err, "out is finished: nothing to resume\n");
+  EXPECT_EQ(again.err, "out is already finished\n");
   EXPECT_EQ(RunFiles(folder_ / "out"), files);
 }
 
@@ -101,8 +103,8 @@ TEST_F(SweepResumeCli, RefusesAnotherSweep) {
   const Outcome options = Sweep("out", {"--resume", "--first-seed", "5"});
   EXPECT_EQ(options.code, 73);
   EXPECT_TRUE(options.err.starts_with(
-      "error: out.partial: was made from other inputs: command: now 'sweep --runs 40 --first-seed "
-      "5', was 'sweep --runs 40 --first-seed 1'; "))
+      "error: out.partial: the folder was made from other inputs: command: now 'sweep --runs 40 "
+      "--first-seed 5', was 'sweep --runs 40 --first-seed 1'; "))
       << options.err;
   const Outcome config = Sweep("out", {"--resume", "--set", "sensors.stereo.sigma_px=2"});
   EXPECT_EQ(config.code, 73);
@@ -111,7 +113,8 @@ TEST_F(SweepResumeCli, RefusesAnotherSweep) {
   EXPECT_EQ(Sweep("out", {"--resume"}).code, 0) << Read("stderr");
   const Outcome finished = Sweep("out", {"--resume", "--first-seed", "5"});
   EXPECT_EQ(finished.code, 73);
-  EXPECT_TRUE(finished.err.starts_with("error: out: was made from other inputs: ")) << finished.err;
+  EXPECT_TRUE(finished.err.starts_with("error: out: the folder was made from other inputs: "))
+      << finished.err;
 }
 
 TEST_F(SweepResumeCli, ReplacesNothingThatIsNoSweep) {

@@ -3,8 +3,8 @@
 #
 # tests/cluster/mpi_test.sh PROGRAM
 #
-# Runs scripts/cluster/mpi_shard.sh under mpirun: the merged shards of all ranks have the same bytes
-# as a sweep in one process. Exit code 77: mpirun is not installed.
+# Runs scripts/cluster/mpi_shard.sh under mpirun. The merged shards of all ranks must have the same
+# bytes as a sweep in one process. Exit code 77: mpirun is not installed.
 set -euo pipefail
 ALIDADE=$(realpath "$1")
 export ALIDADE
@@ -20,7 +20,7 @@ mpirun --oversubscribe -n 3 scripts/cluster/mpi_shard.sh "$work/mpi" "$config" -
 "$ALIDADE" merge "$work/mpi.shards"/* -o "$work/mpi" --quiet
 diff -r "$work/whole" "$work/mpi"
 
-# Failing runs do not end the other ranks.
+# A run that fails does not end the other ranks.
 printf 't_s,d\n0,80\n0.1,none\n' >"$work/table.csv"
 cat >"$work/table.yaml" <<'YAML'
 alidade: 1

@@ -3,9 +3,10 @@
 #
 # tests/cluster/slurm_test.sh PROGRAM
 #
-# Runs scripts/cluster/slurm_array.sh with a temporary Slurm on this machine only. The merged shards
-# have the same bytes as a sweep in one process. If a task is cancelled, the same submission
-# finishes its shard. Exit code 77: Slurm is not installed.
+# Runs scripts/cluster/slurm_array.sh on a temporary Slurm cluster that consists of this machine
+# only. The merged shards must have the same bytes as a sweep in one process. If a task is
+# cancelled, a second submission with the same arguments must finish its shard. Exit code 77: Slurm
+# is not installed.
 set -euo pipefail
 ALIDADE=$(realpath "$1")
 export ALIDADE
@@ -30,13 +31,13 @@ fail() {
   tail -n 20 "$work"/*.log "$work"/*.shards/*.log >&2 || true
   exit 1
 }
-# Waits until a command succeeds, at most five minutes.
+# Repeats a command until it succeeds, for at most five minutes.
 eventually() {
   for ((i = 0; i < 3000; ++i)); do
     "$@" >/dev/null 2>&1 && return
     sleep 0.1
   done
-  fail "not in time: $*"
+  fail "no success within five minutes: $*"
 }
 
 # ---- Slurm
@@ -93,9 +94,9 @@ whole first --runs 20
 scripts/cluster/slurm_array.sh --cpus-per-task=1 -- 3 "$work/first" "$config" --runs 20
 eventually test -e "$work/first"
 eventually has_ended
-diff -r "$work/first_whole" "$work/first" || fail "the merged shards are others"
+diff -r "$work/first_whole" "$work/first" || fail "the merged shards differ from the sweep in one process"
 
-# Cancelled while both shards are running: finished runs are kept, and nothing is merged.
+# Cancels the job while both shards are running. The finished runs are kept, and nothing is merged.
 runs=(--runs 800 --set source.duration_s=60)
 scripts/cluster/slurm_array.sh -- 2 "$work/second" "$config" "${runs[@]}"
 has_begun() { test -s "$work/second.shards/$1.partial/finished_runs.jsonl"; }
@@ -103,13 +104,13 @@ eventually has_begun 1
 eventually has_begun 2
 scancel --name=sweep
 eventually has_ended
-[[ ! -e $work/second ]] || fail "it was merged without a shard"
-grep -q '"status": "stopped"' "$work/second.shards/2.partial/sweep.json" || fail "a shard was lost"
-grep -q 'second.shards/[12]: is not finished' "$work/second.shards/merge.log" ||
-  fail "the merge does not name the shard"
+[[ ! -e $work/second ]] || fail "the sweep was merged although a shard is not finished"
+grep -q '"status": "stopped"' "$work/second.shards/2.partial/sweep.json" || fail "shard 2 does not have the status 'stopped'"
+grep -q 'second.shards/[12]: the sweep is not finished' "$work/second.shards/merge.log" ||
+  fail "merge.log does not name the unfinished shard"
 scripts/cluster/slurm_array.sh -- 2 "$work/second" "$config" "${runs[@]}"
 eventually test -e "$work/second"
 eventually has_ended
 whole second "${runs[@]}"
-diff -r "$work/second_whole" "$work/second" || fail "the shards that were resumed are others"
+diff -r "$work/second_whole" "$work/second" || fail "the resumed shards differ from the sweep in one process"
 echo "ok"

@@ -50,7 +50,7 @@ bool HasCeres() {
 // With known depth the batch is correct: its scale is 1, and its covariance agrees with its errors.
 // The batch smooths the whole trajectory, so only its last frame can be compared with the filter.
 TEST(BatchReference, IsRightWhereScaleIsAnchored) {
-  if (!HasCeres()) GTEST_SKIP() << "built without the Ceres solver";
+  if (!HasCeres()) GTEST_SKIP() << "this build does not contain the Ceres solver";
   const EkfAndBatch means("batch.yaml", {});
   EXPECT_NEAR(Of(means.batch, "map.sim3.scale"), 1.0, 0.005);
   EXPECT_NEAR(Of(means.batch, "nees.mean:cam"), 1.0, 0.5);
@@ -62,10 +62,11 @@ TEST(BatchReference, IsRightWhereScaleIsAnchored) {
   EXPECT_LE(last, 1.25);
 }
 
-// 40 priors are the only information on scale. Their mean inverse distance is 1 / 0.8 times the
-// truth. The error of the batch is larger than that of the filter, and only NEES shows this.
+// The only information on scale comes from 40 priors, whose mean inverse distance is 1 / 0.8 times
+// the truth. The error of the batch is larger than that of the filter, and only NEES reveals the
+// error.
 TEST(BatchReference, IsWrongWhereScaleIsVotedByPriors) {
-  if (!HasCeres()) GTEST_SKIP() << "built without the Ceres solver";
+  if (!HasCeres()) GTEST_SKIP() << "this build does not contain the Ceres solver";
   Settings settings = kNoKnownDepth;
   settings.push_back(kWrongPrior);
   const EkfAndBatch means("batch.yaml", settings);

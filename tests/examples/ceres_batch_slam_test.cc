@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// Summaries of the filter and of the batch over the seeds 1001 to 1008. Both use the same config
+/// Summaries of the filter and of the batch over the seeds 1001 to 1008, both with the same config
 /// of example 10.
 struct Pair {
   SweepSummary ekf, batch;
@@ -53,8 +53,8 @@ TEST(CeresBatchSlam, IsBetterThanTheFilterOnASidewaysSweep) {
 
 class CeresBatchSlamDrives : public testing::DrivesTest {};
 
-// `most` is the RMS error of the position over the first `frames` frames in m. An independent batch
-// reached it.
+// `most` is the RMS error, in m, of the position over the first `frames` frames. An independent
+// batch attained this error.
 TEST_F(CeresBatchSlamDrives, StaysWithinThePublishedErrorsWithARobustLoss) {
   const struct {
     const char* name;

@@ -21,7 +21,7 @@ namespace {
 
 using bench::PairSeries;
 
-// f B = 400 px m and the first depth is 40 m, so d = 10 s without noise. Only the first two rows
+// f B = 400 px m and the first depth is 40 m, so without noise d = 10 s. Only the first two rows
 // have a disparity.
 PairSeries FourRows() {
   return {"made up",
@@ -38,8 +38,8 @@ TEST(PairSeries, TheLineIsExactWithoutNoise) {
   EXPECT_NEAR(LineRmse(FourRows()), 0.0, 1e-12);
 }
 
-// c = (11 * 1 + 12.5 * 1.25) / (1 + 1.5625) = 26.625 / 2.5625 px; 400 / c = 38.497653 m.
-// The computed depth is 3.7559 % too small: by 0.93897 m at 25 m and by 0.75117 m at 20 m.
+// c = (11 * 1 + 12.5 * 1.25) / (1 + 1.5625) = 26.625 / 2.5625 px; 400 / c = 38.497653 m. The
+// computed depth is 3.7559 % too small, which is 0.93897 m at 25 m and 0.75117 m at 20 m.
 TEST(PairSeries, TheLineIsFittedOverTheSeenHalf) {
   PairSeries series = FourRows();
   series.rows[0].disparity_px = 11.0;
@@ -89,8 +89,8 @@ TEST(PairSeries, WhiteNoiseIsWhatBendsARamp) {
   EXPECT_NEAR(WhiteVariance(series, depth), 0.04, 0.008);
 }
 
-// For 400 normal values with sigma 2, the interval is close to the mean -+ 1.96 * 2 / sqrt(400) =
-// 0.196.
+// For 400 normal values with sigma 2, the bounds of the interval are close to the mean -+ 0.196,
+// because 1.96 * 2 / sqrt(400) = 0.196.
 TEST(Bootstrap, IsTheIntervalOfTheMean) {
   Random random(1);
   std::vector<double> values(400);
@@ -116,11 +116,14 @@ Experiment RealPairs(const std::filesystem::path& file, const PluginHost& host) 
   return BuildExperiment(config, host);
 }
 
-// The filter was tuned on the 1st, 3rd, ... series, sorted by name. This test uses the others.
+// The filter was tuned on the 1st, 3rd, ... series, sorted by name. This test uses the other
+// series.
 TEST(DepthPairs, FusedIsNoWorseThanTheLineOnTheReportedSeries) {
   const char* data = std::getenv("ALIDADE_DATA");
   const auto folder = std::filesystem::path(data == nullptr ? "" : data) / "kitti-depth-pairs";
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "ALIDADE_DATA has no kitti-depth-pairs";
+  if (!std::filesystem::exists(folder)) {
+    GTEST_SKIP() << "ALIDADE_DATA does not contain kitti-depth-pairs";
+  }
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (entry.path().extension() == ".csv") files.push_back(entry.path());

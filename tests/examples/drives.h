@@ -23,7 +23,7 @@ class DrivesTest : public ::testing::Test {
     const char* data = std::getenv("ALIDADE_DATA");
     if (data != nullptr) folder_ = std::filesystem::path(data) / "kitti-stereo-tracks";
     if (!std::filesystem::is_directory(folder_)) {
-      GTEST_SKIP() << "ALIDADE_DATA has no kitti-stereo-tracks";
+      GTEST_SKIP() << "ALIDADE_DATA does not contain kitti-stereo-tracks";
     }
   }
   /// Returns the config of `example` for the first `frames` frames of `drive`.

@@ -45,7 +45,7 @@ RunResult RunExample(const std::string& name, const Settings& settings) {
 /// Means over the runs of the seeds 1001 to 1200 that did not diverge.
 struct Means {
   int diverged = 0;      ///< number of runs that diverged
-  int inconsistent = 0;  ///< number of inconsistent runs among the others
+  int inconsistent = 0;  ///< number of runs that are inconsistent but did not diverge
   std::map<std::string, double> metrics;
   double operator[](const std::string& key) const { return metrics.at(key); }
 };
@@ -88,7 +88,7 @@ TEST(Examples, EveryExampleRuns) {
     // The recorded drives are not in this repository. SlamOdometryTracks and SlamStereoTracks test
     // these examples.
     if (entry.path().filename().string().ends_with("_tracks")) continue;
-    // these examples need rendered images
+    // These examples need rendered images.
     if (entry.path().filename().string().ends_with("_images")) continue;
     ++count;
     const RunResult run = RunExample(entry.path().filename(), {});
@@ -167,8 +167,8 @@ TEST(Examples, ThePrincipledFilterBeatsTheFusedFilterOf2017) {
   }
 }
 
-// The initial estimate has errors of 5 cm in depth and 10 % in lambda. The prior sigmas equal these
-// errors.
+// The initial estimate has an error of 5 cm in depth and of 10 % in lambda. The prior sigmas equal
+// these errors.
 TEST(Examples, TheIteratedFilterStartsFromFarAway) {
   const auto means = Sweep("06_depth_poor_initial");
   const Means &ekf = means.at("ekf"), &iekf = means.at("iekf");
@@ -181,8 +181,8 @@ TEST(Examples, TheIteratedFilterStartsFromFarAway) {
   }
 }
 
-/// Returns the RMS difference between the estimates of a block by the first two estimators of the
-/// example.
+/// Returns the RMS difference between the first two estimators of the example in their estimates of
+/// a block.
 double RmsApart(const std::string& name, int seed, const std::string& block) {
   Config config = Config::FromFile(kExamples / name / "config.yaml");
   config.Set("source.seed", std::to_string(seed), "--set");
@@ -201,7 +201,7 @@ double RmsApart(const std::string& name, int seed, const std::string& block) {
   return std::sqrt(squares / count);
 }
 
-// Experiment 5: "the order probably does not matter". The prototype had an RMS difference of 0.026
+// Experiment 5: "the order probably does not matter". In the prototype the RMS difference was 0.026
 // mm.
 TEST(Examples, TheOrderOfTheTwoUpdatesHardlyMatters) {
   const auto means = Sweep("17_depth_update_order");
@@ -217,7 +217,8 @@ TEST(Examples, TheOrderOfTheTwoUpdatesHardlyMatters) {
     apart += RmsApart("17_depth_update_order", seed, "target.depth") / 200.0;
   }
   EXPECT_LE(apart, 3e-5);
-  EXPECT_GE(apart, 1e-5) << "the second update is linearised at what the first one left";
+  EXPECT_GE(apart, 1e-5)
+      << "the order has an effect, because the first update moves the point of linearisation";
 }
 
 /// Returns sigma of the depth in example 18 after `updates` updates. Uses the scalar form of the
@@ -319,7 +320,7 @@ double Median(std::vector<double> values) {
 
 TEST(Examples, RealSeriesAreBetterFusedThanByStereoAlone) {
   const auto files = ReportingSeries();
-  if (files.empty()) GTEST_SKIP() << "ALIDADE_DATA has no kitti-depth-pairs";
+  if (files.empty()) GTEST_SKIP() << "ALIDADE_DATA does not contain kitti-depth-pairs";
   std::map<std::string, std::vector<double>> masked;
   double whole_fused = 0.0, whole_stereo = 0.0;
   for (const auto& file : files) {
@@ -341,10 +342,10 @@ const Settings kPoorStart = {{"state.target.initial.depth", "{mean: 0.35, sigma:
                              {"state.target.initial.depth_rate", "{mean: 0, sigma: 0.5}"},
                              {"state.template.initial.inverse_distance", "{mean: 3, sigma: 1.5}"}};
 
-// The smoother of a prototype and its batch had the errors 1.03 mm and 11.7 mm/s, and 99 % of the
-// NEES within the 95 % bound.
+// In a prototype, the smoother and the batch had errors of 1.03 mm and 11.7 mm/s, and 99 % of the
+// NEES were within the 95 % bound.
 TEST(Examples, TheSmootherHalvesTheErrorOfTheFilter) {
-  if (!kHasCeres) GTEST_SKIP() << "built without Ceres";
+  if (!kHasCeres) GTEST_SKIP() << "this build does not contain the Ceres solver";
   const auto means = Sweep("08_depth_all_estimators");
   const Means &ekf = means.at("ekf"), &rts = means.at("rts"), &root = means.at("square_root");
   const Means& batch = means.at("batch");
@@ -365,7 +366,7 @@ TEST(Examples, TheSmootherHalvesTheErrorOfTheFilter) {
 }
 
 // The prior is depth 0.35 +- 0.1 m and lambda 3 +- 1.5 /m. Sigma points at 3.9 sigma lie beyond the
-// poles of both.
+// poles of both measurement models.
 TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
   Settings alone = kPoorStart;
   alone.emplace_back("estimators", "{ukf: {type: ukf, gate: 0.9999}}");
@@ -406,7 +407,7 @@ TEST(Examples, SatellitesFromATableGiveTheSameEstimates) {
     EXPECT_EQ(read.estimators[i].counts, straight.estimators[i].counts);
     EXPECT_GT(read.estimators[i].counts.at("accepted:gnss"), 300);
     for (const auto& [key, value] : read.estimators[i].metrics) {
-      // compares the metrics that need no truth
+      // Compares the metrics that do not need truth.
       EXPECT_EQ(value, straight.estimators[i].metrics.at(key)) << key;
     }
   }
@@ -425,7 +426,7 @@ TEST(Examples, WhatAnEstimatorTypeDoesNotHaveIsRefusedByName) {
       try {
         RunExample("08_depth_all_estimators",
                    {{"estimators", "{one: {type: " + type + "}}"}, {key, value}});
-        ADD_FAILURE() << type << " took " << key;
+        ADD_FAILURE() << type << " accepted " << key;
       } catch (const Error& error) {
         EXPECT_EQ(error.code(), ExitCode::kBadConfig);
         const std::string text = error.what();

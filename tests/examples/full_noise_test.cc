@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests a full matrix R as in docs/noise_models.md. R comes from the config, from a user's own
-// model, or with each measurement.
+// Tests a full matrix R as in docs/noise_models.md. R is set in the config, computed by a user's
+// own model, or supplied with each measurement.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,7 +25,7 @@ namespace {
 /// correlated.
 template <class Representation>
 struct CorrelatedPixel : LandmarkSensor<CorrelatedPixel<Representation>, Vec<2>, Representation> {
-  static constexpr Quantity kMeasurement{"pixel", "px", "where the landmark is seen", "u,v"};
+  static constexpr Quantity kMeasurement{"pixel", "px", "image of the landmark", "u,v"};
   static constexpr int kPrior = 1;
 
   InverseDepthFeature<Representation> pixel;  // computes h, the valid domain and the inverse model

@@ -27,7 +27,7 @@ auto SweepLoops(const std::string& radius_m) {
 
 TEST(LoopClosure, TakesTheDriftOutOfFilterAndBatch) {
 #ifdef ALIDADE_WITHOUT_CERES
-  GTEST_SKIP() << "no Ceres solver";
+  GTEST_SKIP() << "this build does not contain the Ceres solver";
 #endif
   const auto open = SweepLoops("0"), closed = SweepLoops("1");
   const auto mean = [](const auto& of, const char* metric) { return of.metrics.at(metric).mean; };
@@ -36,8 +36,8 @@ TEST(LoopClosure, TakesTheDriftOutOfFilterAndBatch) {
     EXPECT_NEAR(mean(closed[i], "nees.mean:cam"), 1.0, 0.3);
   }
   EXPECT_NEAR(mean(closed[0], "nis.mean:loops"), 1.0, 0.15);
-  // The batch also corrects the path before the first loop closure. At the end, filter and batch
-  // have used the same data on the keyframes.
+  // The batch also corrects the path before the first loop closure. At the end, the filter and the
+  // batch have used the same data on the keyframes.
   EXPECT_LT(mean(closed[1], "rmse:cam.position"), 0.6 * mean(closed[0], "rmse:cam.position"));
   EXPECT_LT(mean(closed[0], "map.rmse"), 1.15 * mean(closed[1], "map.rmse"));
 }

@@ -4,11 +4,12 @@
 # tests/examples/readme_test.sh PROGRAM COMPILER [README]
 #
 # Runs the code blocks of README.md in a temporary folder. A block below `<!-- test: FILE -->` is
-# written to FILE. In a block below `<!-- test: output -->` each line that begins with `$ ` is run,
-# with PROGRAM for `alidade` and COMPILER for `g++`. The lines below the command must appear in its
-# output in this order; other lines may come between them. Numbers may differ by 1 %: the seed is
-# fixed, but the last digits depend on the compiler. A block marked `output batch` is skipped in a
-# build without the batch estimators. Each scripts/NAME in a block of the language sh must exist.
+# written to FILE. In a block below `<!-- test: output -->` each line that begins with `$ ` is run
+# as a command, with PROGRAM instead of `alidade` and COMPILER instead of `g++`. The output of the
+# command must contain the lines below the command in this order; other lines may come between them.
+# Numbers may differ by 1 %: the seed is fixed, but the last digits depend on the compiler. A block
+# marked `output batch` is skipped in a build without the batch estimators. Each scripts/NAME in a
+# block of the language sh must exist.
 set -euo pipefail
 program=$(realpath "$1")
 compiler=$(command -v "$2")
@@ -26,7 +27,7 @@ chmod +x "$work/bin/alidade" "$work/bin/g++"
 export PATH=$work/bin:$PATH
 
 # Extracts the blocks: files, and commands with their expected lines. A command is written to
-# $work/N.command, its lines to $work/N.lines.
+# $work/N.command, and its expected lines are written to $work/N.lines.
 awk -v work="$work" '
   /^<!-- test: / { kind = $3; needs = $4 == "batch"; next }
   /^```/ && !inside { inside = 1; sh = $0 == "```sh"; next }
@@ -74,7 +75,7 @@ plugins=$(alidade plugins list)
 for ((n = 1; ; n++)); do
   [[ -e $n.command ]] || break
   if [[ -e $n.needs_batch && $plugins != *ceres_batch* ]]; then
-    echo "skipped, no batch: $(cat $n.command)"
+    echo "skipped, because this build has no batch estimator: $(cat $n.command)"
     continue
   fi
   bash -e "$n.command" >"$n.printed" 2>&1 || { cat "$n.printed" >&2; exit 1; }
@@ -85,5 +86,5 @@ for ((n = 1; ; n++)); do
   fi
   commands=$((commands + 1))
 done
-((commands >= 3)) || { echo "error: only $commands commands in $readme" >&2; exit 1; }
+((commands >= 3)) || { echo "error: $readme contains only $commands commands; expected at least 3" >&2; exit 1; }
 echo "readme: $commands commands print what $readme shows"

@@ -116,7 +116,7 @@ void Compare(const Figures& found, const std::string& name) {
   const std::filesystem::path file = kReplay / (name + ".csv");
   if (std::getenv("ALIDADE_REPLAY_WRITE") != nullptr) return WriteFigures(found, file);
   const Figures expected = ReadFigures(file);
-  ASSERT_FALSE(expected.empty()) << "no figures in " << file;
+  ASSERT_FALSE(expected.empty()) << "this file contains no recorded numbers: " << file;
   ASSERT_EQ(found.size(), expected.size());
   int wrong = 0;
   for (const auto& [row, values] : expected) {
@@ -125,12 +125,12 @@ void Compare(const Figures& found, const std::string& name) {
     ASSERT_EQ(now.size(), values.size()) << row;
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (now[i] == values[i]) continue;
-      // A value near 0 may be the difference of two values near 1. It is then only as accurate as
-      // these values.
+      // A value near 0 may be the difference of two values near 1. Such a value is only as accurate
+      // as these two values.
       if (std::abs(now[i] - values[i]) <= kTolerance * std::max(std::abs(values[i]), 1e-3))
         continue;
       ADD_FAILURE() << row << ", number " << i + 1 << ": " << now[i] << ", was " << values[i];
-      if (++wrong == 5) return;  // the first differences show the place of the change
+      if (++wrong == 5) return;  // the first differences locate the change
     }
   }
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Tests examples/27_slam_inverse_depth_prior. A prior of 1 /m is correct for points about 1 m away.
-// For points at other distances it gives a wrong scale.
+// For points at other distances this prior leads to a wrong scale.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -37,8 +37,8 @@ TEST(SlamInverseDepthPrior, OneIsRightAboutOneMetreAway) {
   EXPECT_LE(near.metrics.at("nees.mean:cam").mean, 2.0);
 }
 
-// One scene is 1 / 0.39 times as large as the other. Both have the same pixels, so the estimates
-// are the same.
+// One scene is 1 / 0.39 times as large as the other. Both scenes produce the same pixels, so the
+// estimates are the same.
 TEST(SlamInverseDepthPrior, TheSameFilterMakesTheSameMapOfALargerScene) {
   const double larger = 1.0 / 0.39;
   const SweepSummary near = EightWithPrior("config.yaml", kOne);

@@ -50,7 +50,7 @@ TEST_F(SlamOdometryTracks, IsBetterThanDeadReckoningAndThePublishedFilter) {
 }
 
 // The truth jitters by 0.035 m, which makes no filter inconsistent. In drive 0095 the odometry has
-// a speed error of 1.6 %. The filter does not model such an error, so it is inconsistent.
+// a speed error of 1.6 %. The filter does not model a speed error, so it is inconsistent.
 TEST_F(SlamOdometryTracks, IsInconsistentOnlyWhereTheOdometryIs) {
   for (const Drive& drive : kDrives) {
     const EstimatorResult ekf = Ekf(drive);

@@ -34,7 +34,8 @@ TEST(SlamParameters, VagueInitialVelocitiesCostLittle) {
   }
 }
 
-// If the assumed noise is too small, this does more harm than if it is ten times too large.
+// An assumed noise that is too small does more harm than an assumed noise that is ten times too
+// large.
 TEST(SlamParameters, TooLittleNoiseMakesTheFilterOverconfident) {
   const auto nees = [](const char* key, const char* value) {
     return Mean(Ten(key, value), "nees.mean:cam");

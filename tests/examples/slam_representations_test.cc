@@ -40,8 +40,8 @@ TEST(SlamRepresentations, AgreeAndConversionIsHarmlessOnlyWhereItIsLinear) {
   }
   EXPECT_LE(mean("inverse_depth", "nees.mean:cam"), 1.4);
   EXPECT_GE(mean("inverse_depth", "nees.within95:cam"), 0.85);
-  // Conversion at a linearity index [Civera2008] of 40 % makes the filter inconsistent, and 60 %
-  // makes it more inconsistent.
+  // Conversion at a linearity index [Civera2008] of 40 % makes the filter inconsistent. At 60 % the
+  // filter is even more inconsistent.
   EXPECT_GE(mean("xyz_40", "nees.mean:cam"), 1.6);
   EXPECT_LE(mean("xyz_40", "nees.within95:cam"), 0.75);
   EXPECT_GT(mean("xyz_60", "nees.mean:cam"), mean("xyz_40", "nees.mean:cam"));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests examples/11_slam_reprojection and the scenes of example 10 against a claim of 2015. After
-// its initial peak the reprojection error settles, in a number of frames that does not depend on
-// the noise. The claim holds only if the filter assumes the true noise.
+// Compares examples/11_slam_reprojection and the scenes of example 10 with a claim of 2015: after
+// an initial peak the reprojection error settles, in a number of frames that does not depend on the
+// noise. The claim holds only if the filter assumes the true noise.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -53,9 +53,9 @@ TEST(SlamReprojection, SettlesInAsManyFramesIfTheFilterKnowsTheNoise) {
   }
 }
 
-// The filter assumes a noise of 1 px. It settles at frame 5.8 if the true noise is 1 px. With
-// 0.25 px it settles at frame 11.8. With 4 px it settles at frame 50, and its NEES is 710. The
-// bounds are the geometric means.
+// The filter assumes a noise of 1 px. If the true noise is 1 px, the filter settles at frame 5.8.
+// With 0.25 px it settles at frame 11.8. With 4 px it settles at frame 50, and its NEES is 710.
+// Each bound is the geometric mean of the value for 1 px and the value for the other noise.
 TEST(SlamReprojection, SettlesLaterIfTheFilterAssumesAnotherNoise) {
   const char* const name = "11_slam_reprojection/config.yaml";
   const auto frames = [](const SweepSummary& ekf) {

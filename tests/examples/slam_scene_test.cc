@@ -74,7 +74,7 @@ TEST(SlamScene, WithoutNoiseTheMapIsExactButForLinearisation) {
   EXPECT_LE(ekf.metrics.at("nis.mean:pixels").mean, 0.05);
 }
 
-// docs/why_filters_fail.md: without delayed initialisation, 3 of these 20 runs are inconsistent.
+// Without delayed initialisation, 3 of these 20 runs are inconsistent (docs/why_filters_fail.md).
 TEST(SlamScene, WhoseMotionIsSlowKeepsItsDepthWhereLandmarksWaitForTheMotion) {
   const SweepSummary waits = Twenty("slow_sweep.yaml");
   EXPECT_EQ(waits.diverged + waits.inconsistent, 0);

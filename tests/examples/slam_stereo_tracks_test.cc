@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Runs examples/14_slam_stereo_tracks on real drives. Checks the final error as a share of the path
-// length.
+// Runs examples/14_slam_stereo_tracks on real drives. Checks the final error as a fraction of the
+// path length.
 #include <cmath>
 #include <tuple>
 
@@ -19,7 +19,7 @@ struct Drive {
 };
 constexpr Drive kDrives[] = {
     {"drive_0001", 90, 90.7}, {"drive_0036", 232, 165.8}, {"drive_0095", 132, 121.1}};
-constexpr double kMost = 0.03;  // as a share of the path length; a prototype had 0.013 to 0.019
+constexpr double kMost = 0.03;  // fraction of the path length; a prototype attained 0.013 to 0.019
 
 class SlamStereoTracks : public testing::DrivesTest {
  protected:

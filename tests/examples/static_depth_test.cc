@@ -67,7 +67,7 @@ TEST(StaticDepth, PrintsWhatTheEngineEstimates) {
     double t = 0.0, depth = 0.0, sigma = 0.0;
     ASSERT_NE(std::fgets(line, sizeof(line), printed), nullptr);
     ASSERT_EQ(std::sscanf(line, "%lf %lf %lf", &t, &depth, &sigma), 3) << line;
-    constexpr double kPrinted = 5.01e-7;  // half of the sixth decimal, the last one printed
+    constexpr double kPrinted = 5.01e-7;  // half a unit of the sixth decimal, the last printed one
     EXPECT_NEAR(t, Seconds(frame.timestamp), 5e-4);
     EXPECT_NEAR(depth, engine.state().values()[0], kPrinted);
     EXPECT_NEAR(sigma, std::sqrt(engine.state().covariance().Variance(0)), kPrinted);

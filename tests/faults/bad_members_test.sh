@@ -3,7 +3,7 @@
 #
 # tests/faults/bad_members_test.sh COMPILER INCLUDE...
 #
-# Compiles tests/faults/plugins/bad_member.cc with every value of BAD_MEMBER: if a member of a model
+# Compiles tests/faults/plugins/bad_member.cc with every value of BAD_MEMBER. If a member of a model
 # cannot be called, the compiler error must name the member, the call and the model.
 set -euo pipefail
 compiler=$1
@@ -24,7 +24,7 @@ refused() {
     grep -qF "$words" "$errors" && grep -qF "$model" "$errors" && return
     cat "$errors" >&2
   fi
-  echo "error: BAD_MEMBER=$number is not refused with '$words' of $model" >&2
+  echo "error: BAD_MEMBER=$number: the compiler does not refuse $model with '$words'" >&2
   exit 1
 }
 
@@ -53,4 +53,4 @@ refused 21 Seen 'Predict has to be a template <class T> on the scalar type'
 refused 22 Moved 'a motion model needs static constexpr std::array kBlocks'
 refused 23 Moved 'Step has to be a template <class T> on the scalar type'
 refused 24 Moved 'noise_kind has to be declared as NoiseKind noise_kind() const'
-echo "all are refused in words"
+echo "all faults are refused with the expected messages"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Tests configs with one fault each. A config is a base config of tests/faults/configs with one or
-// two changed lines. Each row has the expected exit code, and the line and words of the expected
-// message.
+// two changed lines. Each row contains the expected exit code, and the line and words of the
+// expected message.
 #include <gtest/gtest.h>
 
 #include "support/program.h"
@@ -10,7 +10,7 @@
 namespace alidade::testing {
 namespace {
 
-using namespace std::string_literals;  // NOLINT(google-build-using-namespace): for a NUL in a text
+using namespace std::string_literals;  // NOLINT(google-build-using-namespace): for text with NUL
 
 const fs::path kBases = fs::path(ALIDADE_SOURCE_DIR) / "tests/faults/configs";
 
@@ -81,7 +81,7 @@ const Fault kTextFaults[] = {
     MakeFault("17_invalid_utf8", "depth", {After("alidade: 1", "title: caf\xE9")}, 2,
               "invalid UTF-8; expected UTF-8 text"),
     MakeFault("17_nul", "depth", {After("alidade: 1", "title: a\0b"s)}, 2,
-              "NUL byte; expected text"),
+              "the text contains a NUL byte"),
     MakeFault("19_merge_key", "depth", {{"focal_px: 400", "<<: {focal_px: 400}"}}, 19, "<<"),
     MakeFault("20_second_document", "depth", {After(kDepthSource, "---")}, 29, "document"),
     MakeFault("21_empty", "", {}, 0, "empty"),
@@ -100,7 +100,7 @@ const Fault kKeyFaults[] = {
               "output: "),
     MakeFault("02_override_of_no_entry", "depth",
               {{kEkf, "{type: ekf,\n    overrides: {sensors: {stero: {sigma_px: 2}}}}"}}, 31,
-              "estimators.ekf.overrides.sensors.stero: no entry 'stero' in 'sensors' to override; "
+              "estimators.ekf.overrides.sensors.stero: 'sensors' has no entry 'stero' to override; "
               "expected one of stereo, scale, or a new entry with a model; did you mean 'stereo'?"),
     MakeFault("02_title_is_a_list", "depth", {{"alidade", "title: [a, b]\nalidade"}}, 1, "title: "),
     MakeFault("02_truth_of_no_block", "depth",
@@ -110,8 +110,8 @@ const Fault kKeyFaults[] = {
               "and size of one block, as in ENTRY.BLOCK; did you mean 'depth'?"),
     MakeFault("02_truth_sigma_of_no_truth", "depth",
               {After(kEkf, "evaluate: {truth_sigma: {dept: 0.01}}")}, 31,
-              "evaluate.truth_sigma.dept: no truth 'dept'; expected a truth of the source: depth, "
-              "depth_rate, inverse_distance; did you mean 'depth'?"),
+              "evaluate.truth_sigma.dept: the source has no truth 'dept'; expected a truth of the "
+              "source: depth, depth_rate, inverse_distance; did you mean 'depth'?"),
     MakeFault("02_unknown_key_at_the_root", "depth", {{"source:", "estimator: {}\nsource:"}}, 28,
               "estimators"),
     MakeFault("02_unknown_key_of_a_model", "depth", {After(kStereoSigma, "    focal_pix: 3")}, 22,
@@ -139,7 +139,7 @@ const Fault kKeyFaults[] = {
     MakeFault("11_wrong_length", "depth", {{"mean: 0.3", "mean: [0.3, 1]"}}, 8, "1"),
     MakeFault("36_rollback_without_a_window", "depth",
               {After(kEkf, "out_of_sequence: {policy: rollback}")}, 31,
-              "out_of_sequence.policy: 'rollback' without 'window_s'"),
+              "out_of_sequence.policy: 'policy: rollback' needs the key 'window_s'"),
     MakeFault("50_missing_plugin", "depth", {{"stereo_disparity", "stereo_disparty"}}, 16,
               "stereo_disparity", 69),
     MakeFault("74_covariance_not_psd", "depth",
@@ -150,7 +150,8 @@ const Fault kBlockFaults[] = {
     MakeFault(
         "25_constant_and_consider", "depth",
         {{"    noise:", "    consider: [depth_rate]\n    constant: [depth_rate]\n    noise:"}}, 7,
-        "constant: block 'depth_rate' is also in `consider`; expected the block in one of them"),
+        "constant: block 'depth_rate' is also in `consider`; expected the block in only "
+        "one of `constant` (exact) and `consider` (uncertain)"),
     MakeFault("25_cyclic_start", "depth",
               {{"{mean: 0.3, sigma: 0.1}", "{from_measurement: a_by_b}"},
                {"{mean: 3.3, sigma: 0.5}", "{from_measurement: b_by_a}"},
@@ -162,18 +163,18 @@ const Fault kBlockFaults[] = {
                 "source:"}},
               8, "cyclic"),
     MakeFault("25_name_of_a_block", "depth", {{"position: depth", "position: \"depth,m\""}}, 5,
-              "state.target.blocks.position: 'depth,m' cannot name a block; expected letters, "
-              "digits, _ and -"),
+              "state.target.blocks.position: 'depth,m' is not a valid name for a block; expected "
+              "letters, digits, _ and -"),
     MakeFault("25_name_of_a_block_with_a_line_end", "depth",
               {{"velocity: depth_rate", R"(velocity: "depth\nrate")"}}, 5,
-              R"('depth\nrate' cannot name a block)"),
+              R"('depth\nrate' is not a valid name for a block)"),
     MakeFault("25_name_of_a_segment", "depth",
               {After(kEkf, "evaluate: {segments: {\"a@b\": {with: stereo}}}")}, 31,
-              "evaluate.segments.a@b: 'a@b' cannot name a segment"),
+              "evaluate.segments.a@b: 'a@b' is not a valid name for a segment"),
     MakeFault("25_name_of_a_sensor", "depth", {{"  stereo:", "  \"stereo:left\":"}}, 16,
-              "sensors.stereo:left: 'stereo:left' cannot name a sensor"),
+              "sensors.stereo:left: 'stereo:left' is not a valid name for a sensor"),
     MakeFault("25_name_of_a_state_entry", "depth", {{"  target:", "  the target:"}}, 4,
-              "state.the target: 'the target' cannot name a state entry"),
+              "state.the target: 'the target' is not a valid name for a state entry"),
     MakeFault("25_one_block_in_two_roles", "depth", {{kTemplateBlock, "target.depth"}}, 25,
               "another role"),
     MakeFault("25_one_name_for_two_blocks", "depth", {{"velocity: depth_rate", "velocity: depth"}},
@@ -181,23 +182,23 @@ const Fault kBlockFaults[] = {
     MakeFault("25_truth_given_twice", "depth",
               {{kDepthSource, Rows("truth: {target.depth: d,\n  depth: d}")}}, 29,
               "source.truth.depth: the truth does not match a block: target.depth already has "
-              "a truth with the full name"),
+              "a truth with its full name"),
     MakeFault("25_truth_of_two_blocks", "depth",
               {{kTemplateBlocks, "{value: depth}"},
                {"{inverse_distance: {mean", "{depth: {mean"},
                {kTemplateBlock, "template.depth"},
                {kDepthSource, Rows("truth: {depth_rate: s,\n  depth: d}")}},
               29,
-              "source.truth.depth: the truth does not match a block: it could be target.depth "
-              "or template.depth"),
+              "source.truth.depth: the truth does not match a block: the name could mean "
+              "target.depth or template.depth"),
     MakeFault("44_geometry_of_a_role", "depth",
               {After(kTemplateBlocks, "    size: 2"), {"mean: 3.3", "mean: [3.3, 1]"}}, 26,
-              "block 'template.inverse_distance' has geometry vector(2); expected vector(1), as "
+              "block 'template.inverse_distance' has geometry vector(2); expected vector(1) for "
               "role 'inverse_distance' of model 'scale_2d'"),
     MakeFault("44_truth_of_another_size", "depth",
               {{kDepthSource, Rows("truth: {depth_rate: s,\n  target.depth: [d, s]}")}}, 29,
               "source.truth.target.depth: the truth does not match a block: target.depth has size "
-              "1, not 2"),
+              "1, but the truth has size 2"),
 };
 
 const Fault kEstimatorFaults[] = {
@@ -205,8 +206,8 @@ const Fault kEstimatorFaults[] = {
               "unknown key"),
     MakeFault("02_reference_of_no_estimator", "depth",
               {After(kEkf, "  batch: {type: rts}\nreference: btach")}, 32,
-              "reference: no estimator 'btach'; expected truth, or an estimator: ekf, batch; did "
-              "you mean 'batch'?"),
+              "reference: estimator 'btach' does not exist; expected truth, or an estimator: ekf, "
+              "batch; did you mean 'batch'?"),
     MakeFault("02_unknown_key_of_an_estimator", "depth", {{kEkf, "{type: ekf, gaet: 1}"}}, 30,
               "did you mean 'gate'"),
     MakeFault(
@@ -215,12 +216,12 @@ const Fault kEstimatorFaults[] = {
         "{accepted_by: NAME}"),
     MakeFault("02_use_of_no_estimator", "depth",
               {After(kEkf, "  other: {type: ekf, use: {accepted_by: efk}}")}, 31,
-              "estimators.other.use.accepted_by: no estimator 'efk'; expected a name from "
-              "`estimators`; did you mean 'ekf'?"),
+              "estimators.other.use.accepted_by: estimator 'efk' does not exist; expected a name "
+              "from `estimators`; did you mean 'ekf'?"),
     MakeFault("10_estimator_name_taken", "depth", {{"ekf: {type: ekf}", "figures: {type: ekf}"}},
               30,
-              "estimators.figures: 'figures' cannot name an estimator: the run folder uses this "
-              "name"),
+              "estimators.figures: 'figures' cannot name an estimator, because the run folder uses "
+              "this name"),
     MakeFault("10_gate_one", "depth", {{kEkf, "{type: ekf, gate: 1, fuse: joint}"}}, 30,
               "estimators.ekf.gate: '1' is out of range; expected a number in (0, 1), or none"),
     MakeFault("10_gate_zero", "depth", {{kEkf, "{type: ekf, gate: 0, fuse: joint}"}}, 30,
@@ -241,7 +242,7 @@ const Fault kEstimatorFaults[] = {
     MakeFault("25_use_of_one_listed_after", "depth",
               {After("estimators:", "  first: {type: ekf, use: {accepted_by: ekf}}")}, 30,
               "estimators.first.use.accepted_by: 'ekf' is listed after 'first'; expected an "
-              "estimator listed before"),
+              "earlier estimator, which processes each frame before 'first'"),
     MakeFault(
         "25_use_without_the_sensor", "depth",
         {{"ekf: {type: ekf}",
@@ -271,7 +272,7 @@ const Fault kEstimatorFaults[] = {
               25, "estimator type 'iekf' does not support consider roles"),
     MakeFault("unsupported_first_estimate", "depth",
               {{kEkf, "{type: iekf, jacobian: first_estimate}"}}, 30,
-              "estimator type 'iekf' has no choice of Jacobian"),
+              "estimator type 'iekf' has no option for the Jacobian"),
     MakeFault("unsupported_jacobian_at", "depth",
               {{kStereoRoles, "{depth: {block: target.depth, jacobian_at: measurement}}"},
                {kEkf, "{type: square_root_ekf}"}},
@@ -302,7 +303,7 @@ const Fault kLandmarkFaults[] = {
     MakeFault("camera_key_missing", "landmarks", {{"focal_px", "focal"}}, 2, "camera.focal_px"),
     MakeFault("landmarks_attempts_without_a_ratio", "landmarks",
               {After(kPrior, "  prune: {min_attempts: 30}")}, 11,
-              "landmarks.prune.min_attempts: has no effect without"),
+              "landmarks.prune.min_attempts: this key has no effect without"),
     MakeFault("landmarks_known_position_of_two", "landmarks",
               {After(kPrior, "  known:\n    - {id: 3, position: [0, 1], sigma: 0}")}, 12,
               "landmarks.known[0].position"),
@@ -319,7 +320,7 @@ const Fault kLandmarkFaults[] = {
               "landmarks: missing key"),
     MakeFault("landmarks_name_of_a_state_entry", "landmarks",
               {{"  cam:", "  landmarks:"}, {"cam.position", "landmarks.position"}}, 5,
-              "'landmarks' is not a state entry"),
+              "'landmarks' cannot name a state entry"),
     MakeFault("landmarks_negative_sigma", "landmarks", {{"0.25", "-0.25"}}, 10,
               "landmarks.prior.sigma"),
     MakeFault("landmarks_outlier_rejection_unknown", "landmarks",
@@ -336,7 +337,7 @@ const Fault kLandmarkFaults[] = {
               {After(kPrior, "  representation: polar")}, 11, "landmarks.representation"),
     MakeFault("landmarks_role_of_a_block", "landmarks",
               {{"landmark: landmarks", "landmark: cam.position"}}, 15,
-              "sensors.pixels.roles.landmark: not `landmarks`"),
+              "sensors.pixels.roles.landmark: this role is not bound to `landmarks`"),
     MakeFault("landmarks_that_cannot_begin", "landmarks", {{kPrior, "representation: xyz"}}, 10,
               "landmarks: no sensor can initialise a landmark from its first measurement"),
     MakeFault("landmarks_unknown_key", "landmarks", {After(kPrior, "  max_per_fram: 30")}, 11,
@@ -353,7 +354,7 @@ const Fault kLandmarkFaults[] = {
               14,
               "landmarks.prior.inverse_distance: a landmark at infinity cannot have the "
               "representation xyz; expected "
-              "a value above 0, 1/m"),
+              "an inverse distance above 0 (in 1/m)"),
     MakeFault(
         "landmarks_xyz_to_xyz", "landmarks",
         {After(kPrior, "  representation: xyz\n  convert_to_xyz: {max_linearity_index: 0.1}")}, 12,
@@ -405,17 +406,18 @@ class ConfigText : public ProgramTest {
   }
 };
 
-// Fault 15 of tests/faults/README.md.
+// Tests fault 15 of tests/faults/README.md.
 TEST_F(ConfigText, LargerThanOneMebibyteIsRefused) {
   constexpr std::size_t kLimit = 1 << 20;
   const std::string padded = kDepthConfig + '#' + std::string(kLimit, 'x');
   EXPECT_EQ(RunText(padded.substr(0, kLimit)).code, 0);
   const Outcome large = RunText(padded.substr(0, kLimit + 1));
   EXPECT_EQ(large.code, 78);
-  EXPECT_EQ(large.err, "error: text.yaml: larger than 1 MiB; expected a config of at most 1 MiB\n");
+  EXPECT_EQ(large.err,
+            "error: text.yaml: the config is larger than 1 MiB; expected at most 1 MiB\n");
 }
 
-// Fault 18 of tests/faults/README.md.
+// Tests fault 18 of tests/faults/README.md.
 TEST_F(ConfigText, ByteOrderMarkAndCarriageReturnsMakeNoDifference) {
   ASSERT_EQ(RunText(kDepthConfig).code, 0);
   const std::string estimates = Read("out/ekf/estimates.csv");
@@ -426,7 +428,7 @@ TEST_F(ConfigText, ByteOrderMarkAndCarriageReturnsMakeNoDifference) {
   EXPECT_EQ(Read("out/ekf/estimates.csv"), estimates);
 }
 
-// Fault 22 of tests/faults/README.md.
+// Tests fault 22 of tests/faults/README.md.
 TEST_F(ConfigText, AFolderAndAMissingFileAreInputMissing) {
   const auto expect = [&](const std::string& config, const std::string& reason) {
     const Outcome outcome = Call({"run", config, "-o", "out"});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests the whole program with faulty data. The comment above each test has the number of its
+// Tests the whole program with faulty data. The comment above each test contains the number of the
 // fault. The tests of the file readers are in tests/plugins/*/*_faults_test.cc.
 #include <cmath>
 
@@ -12,7 +12,7 @@ namespace {
 using testing::Contains;
 using testing::Outcome;
 
-/// The camera is at rest at the origin or moves along x. It sees landmarks in front of it.
+/// The camera is at rest at the origin or moves along x. Landmarks are in front of the camera.
 constexpr const char* kMapConfig = R"(alidade: 1
 camera: {width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
 state:
@@ -92,9 +92,9 @@ std::string Plane(int frame, double x) {
   return rows;
 }
 
-// Fault 39 of tests/faults/README.md.
+// Tests fault 39 of tests/faults/README.md.
 TEST_F(DataFault, AnIdUsedAgainIsTheNextGeneration) {
-  // The track of feature 7 ends with frame 2. In frame 33 another point gets the same id.
+  // The track of feature 7 ends with frame 2. In frame 33 another point has the same id.
   std::string rows;
   for (int frame = 0; frame < 40; ++frame) {
     rows += Plane(frame, 0.02 * frame);
@@ -109,7 +109,7 @@ TEST_F(DataFault, AnIdUsedAgainIsTheNextGeneration) {
   EXPECT_EQ(Count("landmarks.deleted"), 1);
 }
 
-// Fault 40 of tests/faults/README.md.
+// Tests fault 40 of tests/faults/README.md.
 TEST_F(DataFault, WithoutParallaxLandmarksStayInverseDepth) {
   // The camera moves in the same way in both runs. In the second run the landmarks do not move in
   // the image, as if they were at infinity.
@@ -126,8 +126,8 @@ TEST_F(DataFault, WithoutParallaxLandmarksStayInverseDepth) {
   }
 }
 
-// Fault 41 of tests/faults/README.md: a landmark behind the camera, and depths and disparities that
-// are not positive.
+// Tests fault 41 of tests/faults/README.md: a landmark behind the camera, and depths and
+// disparities that are not positive.
 TEST_F(DataFault, WhatIsNotBeforeTheCameraIsRejectedAndCounted) {
   Write("table.csv", "t_s,d\n0,80\n0.1,0\n0.2,-5\n0.3,82\n");
   Run("table.yaml");
@@ -153,7 +153,7 @@ TEST_F(DataFault, WhatIsNotBeforeTheCameraIsRejectedAndCounted) {
   EXPECT_EQ(Count("invalid:pixels"), 1);
 }
 
-// Fault 42 of tests/faults/README.md.
+// Tests fault 42 of tests/faults/README.md.
 TEST_F(DataFault, AnEmptyFrameIsPredictedThrough) {
   Write("table.csv", "t_s,d\n0,80\n0.1,\n0.2,80\n");
   Run("table.yaml");
@@ -167,7 +167,8 @@ TEST_F(DataFault, AnEmptyFrameIsPredictedThrough) {
   EXPECT_EQ(Count("accepted:pixels"), 6);
 }
 
-// Faults 27 and 43 of tests/faults/README.md: how the program handles an error of a reader.
+// Tests faults 27 and 43 of tests/faults/README.md: an error in a data file ends the run with exit
+// code 65, and the message names the file and the line.
 TEST_F(DataFault, WhatIsNoDataIsExitCode65WithThePlace) {
   for (const char* config : {"table.yaml", "map.yaml"}) {
     const std::string file = config[0] == 't' ? "table.csv" : "tracks.csv";
@@ -178,14 +179,15 @@ TEST_F(DataFault, WhatIsNoDataIsExitCode65WithThePlace) {
         << nothing.err;
     Write(file, "t_s,d\n0,80\n0.1\n");
     const Outcome columns = Run(config, {}, 65);
-    EXPECT_TRUE(Contains(columns.err, file + (config[0] == 't' ? ":3:4: 1 column" : ":1:6: 2 col")))
+    EXPECT_TRUE(Contains(
+        columns.err, file + (config[0] == 't' ? ":3:4: 1 column" : ":1:6: the row has 2 columns")))
         << columns.err;
   }
 }
 
-// Fault 45 of tests/faults/README.md.
+// Tests fault 45 of tests/faults/README.md.
 TEST_F(DataFault, APixelOutsideTheImageIsRejectedAndCounted) {
-  // The image reaches from -0.5 px to 639.5 px in u and to 479.5 px in v.
+  // The image reaches from -0.5 px to 639.5 px in u and from -0.5 px to 479.5 px in v.
   const std::vector<std::pair<double, double>> outside = {
       {-0.6, 100}, {639.6, 100}, {100, -0.6}, {100, 479.6}, {1e9, -1e9}};
   std::string rows;
@@ -208,10 +210,10 @@ TEST_F(DataFault, APixelOutsideTheImageIsRejectedAndCounted) {
   EXPECT_FALSE(Contains(map, "\n10,"));
 }
 
-// Fault 46 of tests/faults/README.md.
+// Tests fault 46 of tests/faults/README.md.
 TEST_F(DataFault, AnotherUnitIsAWarning) {
-  // Disparities of a target at 0.325 m, first in px as in the config, then in a unit that makes
-  // them 1000 times larger.
+  // The disparities belong to a target at 0.325 m. They are first in px, as in the config, and then
+  // in a unit that makes them 1000 times larger.
   const auto table = [](double unit) {
     std::string rows = "t_s,d\n";
     for (int k = 0; k < 15; ++k) {
@@ -220,8 +222,8 @@ TEST_F(DataFault, AnotherUnitIsAWarning) {
     return rows;
   };
   const std::string warning =
-      "ekf: unit\n  sensor 'stereo': the median of |z - h| is more than 100 sigma; is stream "
-      "'disparity' in px?";
+      "ekf: unit\n  sensor 'stereo': most measurements z and their predictions h differ by more "
+      "than 100 sigma; is stream 'disparity' in px?";
   const testing::Arguments gated = {"--set", "estimators.ekf.gate=0.999", "--set",
                                     "state.target.initial.depth={mean: 0.3, sigma: 0.01}"};
   Write("table.csv", table(1.0));
@@ -232,7 +234,7 @@ TEST_F(DataFault, AnotherUnitIsAWarning) {
   EXPECT_TRUE(Contains(Read("out/ekf/events.csv"), ",unit,"));
 }
 
-// Fault 48 of tests/faults/README.md.
+// Tests fault 48 of tests/faults/README.md.
 TEST_F(DataFault, AFileThatChangesWhileItIsReadIsExitCode74) {
   std::string rows = "t_s,d\n", tracks;
   for (int k = 0; k < 200'000; ++k) rows += std::to_string(0.001 * k) + ",80\n";
@@ -245,13 +247,13 @@ TEST_F(DataFault, AFileThatChangesWhileItIsReadIsExitCode74) {
     std::ofstream(folder_ / file, std::ios::app) << "# one more\n";
     const Outcome outcome = Wait(run);
     EXPECT_EQ(outcome.code, 74) << outcome.err;
-    EXPECT_TRUE(Contains(outcome.err, ": changed while it was read")) << outcome.err;
+    EXPECT_TRUE(Contains(outcome.err, ": the file changed while it was read")) << outcome.err;
     EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "failed");
   }
 }
 
-/// Returns the truth of 20 frames with rotations about y from 0 to 3.8 rad. If `turned`, every
-/// third quaternion is negated; otherwise all others are.
+/// Returns the truth of 20 frames with rotations about y from 0 to 3.8 rad. If `turned` is true,
+/// every third quaternion is negated. Otherwise all other quaternions are negated.
 std::string Turning(bool turned, double length = 1.0) {
   std::ostringstream rows;
   rows.precision(17);
@@ -263,7 +265,7 @@ std::string Turning(bool turned, double length = 1.0) {
   return rows.str();
 }
 
-// Fault 49 of tests/faults/README.md.
+// Tests fault 49 of tests/faults/README.md.
 TEST_F(DataFault, TheSignOfAQuaternionIsNotSeen) {
   std::string rows;
   for (int frame = 0; frame < 20; ++frame) rows += Plane(frame, 0.0);
@@ -287,11 +289,12 @@ TEST_F(DataFault, TheSignOfAQuaternionIsNotSeen) {
                                     .Text()));
   }
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(files[i], files[i + 4]);
-  // The signs make the quaternion continuous: at the last rotation, 3.8 rad, w is negative.
+  // The signs are chosen so that the quaternion is continuous: at the last rotation, 3.8 rad, w is
+  // negative.
   EXPECT_TRUE(Contains(files[2], ",0,0,0,-0.3")) << files[2];
 }
 
-// Fault 49 of tests/faults/README.md.
+// Tests fault 49 of tests/faults/README.md.
 TEST_F(DataFault, QuaternionsOfAnotherLengthAreNormalisedAndCounted) {
   std::string rows;
   for (int frame = 0; frame < 20; ++frame) rows += Plane(frame, 0.0);
@@ -304,11 +307,11 @@ TEST_F(DataFault, QuaternionsOfAnotherLengthAreNormalisedAndCounted) {
   Run("map.yaml");
   const Config run = Json("out/run.json");
   EXPECT_EQ(run.root().At("normalised").At("cam.orientation").Number(), 20);
-  // Elements are at most 1 and have a few rounding errors.
+  // The elements are at most 1, and their difference is a few rounding errors.
   ExpectNear(Read("out/truth.csv"), truth, 1e-12);
   Write("truth.tum", Turning(false, 1.0011));
   const Outcome tum = Run("map.yaml", {}, 65);
-  EXPECT_TRUE(Contains(tum.err, "truth.tum:1: quaternion of length 1.0011")) << tum.err;
+  EXPECT_TRUE(Contains(tum.err, "truth.tum:1: the length of the quaternion is 1.0011")) << tum.err;
   // Here the quaternion is read from the columns of a table.
   const testing::Arguments columns = {"--set",
                                       "source={type: csv, path: turn.csv, streams: {tracks: [w, "
@@ -316,13 +319,13 @@ TEST_F(DataFault, QuaternionsOfAnotherLengthAreNormalisedAndCounted) {
   Write("turn.csv", "t_s,w,x,y,z\n0,1,0,0,0\n0.1,0.6,0.8,0,0\n0.2,0.6,0.8,0.0003,0.04\n");
   Run("map.yaml", columns);
   EXPECT_EQ(Json("out/run.json").root().At("normalised").At("orientation").Number(), 1);
-  EXPECT_EQ(Count("invalid:pixels"), 3) << "without an id";
+  EXPECT_EQ(Count("invalid:pixels"), 3)
+      << "a measurement of pixels without a landmark id is invalid";
   Write("turn.csv", "t_s,w,x,y,z\n0,1,0,0,0\n0.1,0.6,0.8,0.1,0\n");
   const Outcome table = Run("map.yaml", columns, 65);
-  EXPECT_TRUE(
-      Contains(table.err,
-               "turn.csv:3 orientation: the length of a unit quaternion is off by 0.004988; "
-               "expected a length within 1e-3 of 1"))
+  EXPECT_TRUE(Contains(table.err,
+                       "turn.csv:3 orientation: the length of a unit quaternion differs from 1 by "
+                       "0.004988; expected a length within 1e-3 of 1"))
       << table.err;
 }
 
@@ -331,8 +334,8 @@ TEST_F(DataFault, ATruthThatNoFrameHasIsTold) {
   Write("truth.tum", "1000 0 0 0 0 0 0 1\n");
   const Outcome run = Run("map.yaml");
   EXPECT_TRUE(Contains(run.out,
-                       "no frame contains the truth of cam.position, cam.orientation; do its times "
-                       "match those of the measurements?"))
+                       "no frame contains the truth of cam.position, cam.orientation; do the times "
+                       "of the truth match those of the measurements?"))
       << run.out;
   Write("truth.tum", "0 0 0 0 0 0 0 1\n");
   EXPECT_FALSE(Contains(Run("map.yaml").out, "no frame contains the truth"));
@@ -356,7 +359,7 @@ TEST_F(DataFault, SignsOfATruthDoNotDependOnTheOrderOfArrival) {
   EXPECT_EQ(Read("out/truth.csv"), truth);
 }
 
-// Fault 78 of tests/faults/README.md.
+// Tests fault 78 of tests/faults/README.md.
 TEST_F(DataFault, ScaleThatNobodyTellsIsReportedAndNoFailure) {
   Write("tracks.csv", Plane(0, 0.0) + Plane(1, 0.01) + Plane(2, 0.02));
   const Outcome alone = Call({"explain", "map.yaml"});
@@ -373,7 +376,8 @@ TEST_F(DataFault, ScaleThatNobodyTellsIsReportedAndNoFailure) {
       << run.out;
   EXPECT_TRUE(Contains(Read("out/run.json"), "\"scale\"")) << Read("out/run.json");
   const char* const observed = "the state is fully observable";
-  // Measured depths make the scale observable. Landmarks of known position do so too.
+  // Measured depths make the scale observable. Landmarks with known positions also make the scale
+  // observable.
   const Outcome depth =
       Call({"explain", "map.yaml", "--set", "sensors.pixels.model=depth_feature", "--set",
             "sensors.pixels.sigma_depth_m=0.02", "--set", "source.measures=depth"});

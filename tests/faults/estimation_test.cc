@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests filters whose covariance becomes invalid. The comment above each test has the number of its
-// fault.
+// Tests filters whose covariance becomes invalid. The comment above each test contains the number
+// of the fault.
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
@@ -50,10 +50,10 @@ Problem TwoElements(const Eigen::Matrix2d& p, double sigma) {
   return problem;
 }
 
-/// Returns a matrix P with the eigenvalues 2.1 and -0.1. It gives S = 1 - 2.2 + 1 + 0.01 < 0.
+/// Returns a matrix P with the eigenvalues 2.1 and -0.1, for which S = 1 - 2.2 + 1 + 0.01 < 0.
 Eigen::Matrix2d Indefinite() { return (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.0).finished(); }
 
-// Fault 75 of tests/faults/README.md.
+// Tests fault 75 of tests/faults/README.md.
 TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
   const Problem problem = TwoElements(Indefinite(), 0.1);
   for (const bool iterated : {false, true}) {
@@ -65,7 +65,7 @@ TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
     EXPECT_TRUE(HasEvent(report, EventKind::kRepaired));
     EXPECT_EQ(filter->state().values(), (std::vector<double>{1.0, 2.0}));
     // The factors of P are l = 1.1 and the pivots 1 and -0.21. The repair sets the negative pivot
-    // to zero and keeps the other factors.
+    // to zero and retains the other factors.
     const Eigen::MatrixXd p = filter->state().covariance().Dense();
     const Eigen::Matrix2d expected = (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.21).finished();
     EXPECT_TRUE(p.isApprox(expected, 1e-12)) << p;
@@ -84,7 +84,7 @@ struct Open : Ekf {
   using Ekf::engine;
 };
 
-// Fault 75 of tests/faults/README.md: the number of repairs is limited.
+// Tests fault 75 of tests/faults/README.md: the number of repairs is limited.
 TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
   const Problem problem = TwoElements(Indefinite(), 0.1);
   EkfOptions options;
@@ -99,8 +99,8 @@ TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
   }
 }
 
-// Fault 75 of tests/faults/README.md: a repair that is undone by a rollback, as for a late frame,
-// is not counted.
+// Tests fault 75 of tests/faults/README.md: a repair that is undone by a rollback, as for a late
+// frame, is not counted.
 TEST(LostPositiveDefiniteness, WhatIsTakenBackIsNotCounted) {
   const Problem problem = TwoElements(Indefinite(), 0.1);
   EkfOptions options;
@@ -114,7 +114,7 @@ TEST(LostPositiveDefiniteness, WhatIsTakenBackIsNotCounted) {
   }
 }
 
-// Fault 75 of tests/faults/README.md: the exit code is 79, and the other estimators continue.
+// Tests fault 75 of tests/faults/README.md: the exit code is 79, and the other estimators continue.
 TEST(LostPositiveDefiniteness, BeyondItsRepairsIsExitCode79) {
   Experiment experiment = MakeExperiment();
   EstimatorSpec named;
@@ -131,14 +131,14 @@ TEST(LostPositiveDefiniteness, BeyondItsRepairsIsExitCode79) {
                                "positive semi-definite"),
             std::string::npos)
       << result.reason;
-  EXPECT_NE(result.reason.find("after 0 repairs; last good state"), std::string::npos)
+  EXPECT_NE(result.reason.find("the limit of repairs is 0; last good state"), std::string::npos)
       << result.reason;
   EXPECT_EQ(result.frames, 60);
   EXPECT_TRUE(result.estimators.back().diverged);
   EXPECT_FALSE(result.estimators.front().diverged);
 }
 
-// Fault 79 of tests/faults/README.md: S = H P H' + R = 0, although P is valid.
+// Tests fault 79 of tests/faults/README.md: S = H P H' + R = 0, although P is valid.
 TEST(SingularInnovation, IsReportedAndChangesNothing) {
   const Eigen::Matrix2d ones = Eigen::Matrix2d::Ones();  // x0 - x1 is known exactly
   const Problem problem = TwoElements(ones, 0.0);
@@ -148,15 +148,15 @@ TEST(SingularInnovation, IsReportedAndChangesNothing) {
   ASSERT_TRUE(HasEvent(report, EventKind::kNotPd));
   const auto event = std::ranges::find(report.events, EventKind::kNotPd, &Event::kind);
   EXPECT_EQ(event->text, "sensor 'difference': S is not positive definite");
-  EXPECT_FALSE(HasEvent(report, EventKind::kRepaired)) << "P is not to blame";
+  EXPECT_FALSE(HasEvent(report, EventKind::kRepaired)) << "P is valid and needs no repair";
   EXPECT_EQ(ekf.state().values(), (std::vector<double>{1.0, 2.0}));
   EXPECT_EQ(ekf.state().covariance().Dense(), Eigen::MatrixXd(ones));
   EXPECT_FALSE(ekf.failed());
   EXPECT_FALSE(ekf.diverged());
 }
 
-// Fault 79 of tests/faults/README.md: two measurements are equal and have no noise. The S of each
-// alone is regular.
+// Tests fault 79 of tests/faults/README.md: two measurements are equal and have no noise. For each
+// measurement alone, S is regular.
 TEST(SingularInnovation, OfTwoStackedMeasurementsRollsBoth) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.0, 2.0}});

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Fault 91 of tests/faults/README.md: checks the files of a killed run, and that a killed sweep can
-// be resumed.
+// Tests fault 91 of tests/faults/README.md: the files of a killed run are usable, and a killed
+// sweep can be resumed.
 #include <algorithm>
 
 #include "support/run_files.h"
@@ -35,9 +35,9 @@ TEST_F(KilledRun, LeavesItsRowsAndARecordThatSaysRunning) {
   const Outcome refused = Call({"run", "config.yaml", "-o", "out", "--no-figures"});
   EXPECT_EQ(refused.code, 73);
   EXPECT_EQ(refused.err,
-            "error: out.partial: exists already: the command that writes it has ended early "
-            "or is still running; "
-            "add --force to replace it, or remove it\n");
+            "error: out.partial: exists already: another command ended before it completed this "
+            "folder, or is still running; "
+            "add --force to replace this folder, or remove it\n");
   EXPECT_EQ(Read("out.partial/ekf/estimates.csv"), rows);
   EXPECT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures", "--force"}).code, 0);
   EXPECT_FALSE(Exists("out.partial"));

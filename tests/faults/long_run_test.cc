@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests that the memory of a run does not grow with its length. The configs are those of
+// Tests that the memory of a run does not grow with the length of the run. The configs are those of
 // bench/long_run.
 #include <algorithm>
 
@@ -24,7 +24,8 @@ class LongRun : public testing::ProgramTest {
     }
     const pid_t pid = Start(arguments);
     const std::string status = "/proc/" + std::to_string(pid) + "/status";
-    // The peak of rusage includes that of this process, so it is read from /proc instead.
+    // The peak memory in rusage includes the memory of this process, so the peak is read from /proc
+    // instead.
     long peak = 0;
     siginfo_t ended{};
     while (::waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 &&
@@ -40,9 +41,9 @@ class LongRun : public testing::ProgramTest {
   }
 };
 
-// Fault 47 of tests/faults/README.md.
+// Tests fault 47 of tests/faults/README.md.
 TEST_F(LongRun, MemoryDoesNotGrowWithTheFile) {
-  if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
+  if (kSanitized) GTEST_SKIP() << "the sanitizer does not return freed memory to the heap";
   const std::string file = (folder_ / "tracks.csv").string();
   const auto peak = [&](int frames) {
     std::ofstream rows(file);
@@ -55,16 +56,17 @@ TEST_F(LongRun, MemoryDoesNotGrowWithTheFile) {
     rows.close();
     return PeakOf(kBench + "stream.yaml", {"source.path=" + file});
   };
-  // The files have 3 and 30 MB. If the run stored the additional 900 000 measurements, each would
-  // take 100 bytes or more.
+  // The files have 3 and 30 MB. If the run stored the additional 900 000 measurements, each of them
+  // would take 100 bytes or more.
   const long shorter = peak(1'000), longer = peak(10'000);
   EXPECT_LT(longer - shorter, 2'048) << shorter << " KiB, then " << longer;
   EXPECT_LT(longer, 100 * 1'024);
 }
 
-// Fault 47 of tests/faults/README.md: the table has truth, so errors and the lag are computed.
+// Tests fault 47 of tests/faults/README.md: the table contains truth, so errors and the lag are
+// computed.
 TEST_F(LongRun, MemoryDoesNotGrowWithTheTable) {
-  if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
+  if (kSanitized) GTEST_SKIP() << "the sanitizer does not return freed memory to the heap";
   const auto peak = [&](int count) {
     std::ofstream rows(folder_ / "table.csv");
     rows << "t_s,d,depth\n";
@@ -73,20 +75,20 @@ TEST_F(LongRun, MemoryDoesNotGrowWithTheTable) {
     rows.close();
     return PeakOf("table.yaml", {"source.truth={depth: depth}"});
   };
-  // If the run stored the estimate and the truth of each row, they would take 16 bytes a row,
-  // together 6 MB.
+  // If the run stored the estimate and the truth of each row, these values would take 16 bytes per
+  // row, or 6 MB in total.
   const long shorter = peak(120'000), longer = peak(520'000);
   EXPECT_LT(longer - shorter, 2'048) << shorter << " KiB, then " << longer;
 }
 
 TEST_F(LongRun, MemoryDoesNotGrowAsLandmarksComeAndGo) {
-  if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
+  if (kSanitized) GTEST_SKIP() << "the sanitizer does not return freed memory to the heap";
   const auto peak = [&](int frames) {
     return PeakOf(kBench + "walk.yaml", {"source.max_frames=" + std::to_string(frames),
                                          "source.max_features_per_frame=20"});
   };
-  // The path of the scene is generated in advance and takes 104 bytes a frame, or 0.3 MB. Storing
-  // all landmarks would take 12 MB.
+  // The path of the scene is generated in advance and takes 104 bytes per frame, or 0.3 MB. If the
+  // run stored all landmarks, they would take 12 MB.
   const long shorter = peak(1'000), longer = peak(4'000);
   EXPECT_LT(longer - shorter, 2'048) << shorter << " KiB, then " << longer;
   const Config run = Json("out/run.json");

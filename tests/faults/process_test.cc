@@ -38,11 +38,11 @@ Experiment Build(const PluginHost& host, const std::string& text = kDepthConfig)
   return BuildExperiment(Config::FromText(text, "config.yaml"), host);
 }
 
-// Fault 72 of tests/faults/README.md.
+// Tests fault 72 of tests/faults/README.md.
 TEST(OneProcess, TwoRunsAgreeWhateverRanBetween) {
   const PluginHost host(std::vector<std::filesystem::path>{});
   Experiment first = Build(host);
-  Experiment waiting = Build(host);  // is created before the other runs and runs after them
+  Experiment waiting = Build(host);  // this experiment is created first and runs last
   const Result expected = Finish(first);
   EXPECT_FALSE(expected.metrics.empty());
   std::string other = kDepthConfig;

@@ -41,7 +41,7 @@ void MakePixels(alidade::Params& p, AlidadeInstance* instance) {
   using namespace alidade::testing;  // NOLINT(google-build-using-namespace): the test sensors
   const int representation =
       p.Choice("landmarks.representation", {"inverse_depth", "anchored", "xyz"},
-               "how landmarks are written", 0);
+               "representation of the landmarks", 0);
   const double sigma = p.Positive("sigma_px", "px", "noise, 1 sigma") /
                        p.Positive("camera.focal_px", "px", "focal length");
   if (representation == 0) Emplace<InverseDepthPixels>(sigma, instance);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Tests faults in the environment of a run: disk, signals and memory. The comment above each test
-// has the number of its fault. Other tests cover these faults:
+// contains the number of the fault. Other tests cover these faults:
 //   87  Recorder.AFullDiskKeepsTheRows, OutputFile.*
 //   90  PipedRun.*, Cli.Stops*, Cli.Signals*, SweepCli.StopsAtASignal*
 //   93  OutputFolder.AFolderThatCannotBeWrittenToIsRefused
@@ -44,7 +44,7 @@ class RunSafety : public ProgramTest {
   std::string Estimates(const std::string& run) const { return Read(run + "/ekf/estimates.csv"); }
 };
 
-// Fault 88 of tests/faults/README.md.
+// Tests fault 88 of tests/faults/README.md.
 TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "whole", "--no-figures"}).code, 0);
   std::uintmax_t largest = 0;
@@ -78,7 +78,7 @@ TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
   EXPECT_TRUE(LeftPartial());
 }
 
-// Fault 89 of tests/faults/README.md.
+// Tests fault 89 of tests/faults/README.md.
 TEST_F(RunSafety, AReaderThatIsGoneIsAnErrorNotASignal) {
   for (const Arguments& command : {Arguments{"run", "config.yaml", "-o", "out", "--no-figures"},
                                    {"sweep", "config.yaml", "--runs", "1", "-o", "sweep"},
@@ -101,7 +101,7 @@ TEST_F(RunSafety, AReaderThatIsGoneIsAnErrorNotASignal) {
   EXPECT_EQ(Json("sweep/sweep.json").root().At("runs_used").Number(), 1);
 }
 
-// Fault 92 of tests/faults/README.md.
+// Tests fault 92 of tests/faults/README.md.
 TEST_F(RunSafety, WhatIsThereIsReplacedByForceOnly) {
   const Arguments run = {"run", "config.yaml", "-o", "out", "--no-figures"};
   ASSERT_EQ(Call(run).code, 0);
@@ -117,7 +117,8 @@ TEST_F(RunSafety, WhatIsThereIsReplacedByForceOnly) {
   EXPECT_NE(Estimates("out"), before);
 }
 
-// Fault 92 of tests/faults/README.md: --force does not delete runs inside the folder of a run.
+// Tests fault 92 of tests/faults/README.md: --force does not delete runs inside the folder of a
+// run.
 TEST_F(RunSafety, ForceSparesRunsInsideARun) {
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "out/base", "--no-figures"}).code, 0);
@@ -137,7 +138,7 @@ TEST_F(RunSafety, ForceSparesRunsInsideARun) {
   EXPECT_TRUE(Exists("out/ekf/sweep/sweep.json"));
 }
 
-// Fault 94 of tests/faults/README.md.
+// Tests fault 94 of tests/faults/README.md.
 TEST_F(RunSafety, TheClockIsInTimingAlone) {
   const auto record = [&](const std::string& output) {
     const Outcome run = Call({"run", "config.yaml", "-o", output, "--quiet"});
@@ -161,9 +162,9 @@ TEST_F(RunSafety, TheClockIsInTimingAlone) {
   EXPECT_GT(same, 12);
 }
 
-// Fault 96 of tests/faults/README.md.
+// Tests fault 96 of tests/faults/README.md.
 TEST_F(RunSafety, MemoryThatRunsOutIsAnErrorAndARecord) {
-  if (kSanitized) GTEST_SKIP() << "the sanitizer maps more than any limit";
+  if (kSanitized) GTEST_SKIP() << "the sanitizer maps more memory than the limits of this test";
   int failed = 0, recorded = 0;
   for (int kib = 8'000; kib <= 60'000; kib += kib < 20'000 ? 3'000 : 1'000) {
     fs::remove_all(folder_ / "out");
@@ -192,9 +193,9 @@ TEST_F(RunSafety, MemoryThatRunsOutIsAnErrorAndARecord) {
   EXPECT_GT(recorded, 0);
 }
 
-// Fault 96 of tests/faults/README.md: memory runs out in the threads of a sweep.
+// Tests fault 96 of tests/faults/README.md: the threads of a sweep run out of memory.
 TEST_F(RunSafety, MemoryThatRunsOutEndsRunsOfASweepNotTheProgram) {
-  if (kSanitized) GTEST_SKIP() << "the sanitizer maps more than any limit";
+  if (kSanitized) GTEST_SKIP() << "the sanitizer maps more memory than the limits of this test";
   int failed = 0;
   for (int kib = 8'000; kib <= 60'000; kib += 250) {
     fs::remove_all(folder_ / "out");

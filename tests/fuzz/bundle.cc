@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The input is a bundle adjustment problem in any format. Reading its BundleText must give the same
-// problem.
+// The input is a bundle adjustment problem in any format. BundleText of this problem must read back
+// as the same problem.
 #include "alidade/bundle/bundle_file.h"
 #include "fuzz.h"
 
@@ -13,8 +13,8 @@ void Read(std::string_view bytes) {
   const std::string text = BundleText(file);
   std::string again;
   Require(Accepts([&] { again = BundleText(ReadBundle(MemoryFile(text).path())); }),
-          "BundleText is refused");
-  Require(text == again, "another BundleText");
+          "the reader refuses a BundleText");
+  Require(text == again, "reading a BundleText changes it");
 }
 
 }  // namespace

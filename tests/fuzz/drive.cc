@@ -2,9 +2,10 @@
 //
 // Replaces libFuzzer: PROGRAM SEED... or PROGRAM FOLDER MUTATIONS
 //
-// Runs each seed once. With FOLDER, then runs the given number of mutations of the seeds. The
-// mutations are the same in every run. An input that ends the program is kept as crash-PROCESS in
-// the working folder. Exit code 2: a seed or the folder cannot be read.
+// Runs each seed once. With FOLDER, the seeds are the files of this folder, and the program also
+// runs MUTATIONS mutations of them. The mutations are the same in every run. An input that ends the
+// program is written to crash-PROCESS in the working folder. Exit code 2: a seed or the folder
+// cannot be read.
 #include <fcntl.h>
 #include <signal.h>
 
@@ -27,8 +28,8 @@ extern "C" void Keep(int signal) {
   std::snprintf(name, sizeof name, "crash-%d", static_cast<int>(::getpid()));
   const int file = ::open(name, O_WRONLY | O_CREAT | O_TRUNC, 0600);
   const bool kept = ::write(file, g_input.data(), g_input.size()) >= 0;
-  std::fprintf(stderr, "signal %d; %s %s\n", signal, kept ? "the input is in" : "cannot keep it in",
-               name);
+  std::fprintf(stderr, "signal %d; %s %s\n", signal,
+               kept ? "the input is in" : "cannot write the input to", name);
   ::signal(signal, SIG_DFL);
   ::raise(signal);
 }

@@ -19,15 +19,15 @@
 /// Helpers of all fuzz targets. Each target is one file with LLVMFuzzerTestOneInput; see README.md.
 namespace alidade::fuzz {
 
-/// Aborts the program if a property does not hold. The fuzzer then keeps the input.
+/// Aborts the program if a property does not hold. The fuzzer then stores the input.
 inline void Require(bool holds, const char* what) {
   if (holds) return;
   std::fprintf(stderr, "fuzz: %s\n", what);
   std::abort();
 }
 
-/// Returns true if `work` ends without an Error, and false if it throws an Error. Another
-/// exception, or an Error that is marked as internal, ends the program.
+/// Returns true if `work` ends without an Error, and false if `work` throws an Error. Any other
+/// exception, and an Error that is marked as internal, ends the program.
 template <class Work>
 bool Accepts(const Work& work) {
   try {
@@ -60,7 +60,7 @@ class MemoryFile {
   explicit MemoryFile(std::string_view bytes) : file_(::memfd_create("fuzz", MFD_CLOEXEC)) {
     const bool written =
         ::write(file_, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());
-    Require(written, "no memory for a file");
+    Require(written, "cannot write a file in memory");
   }
   ~MemoryFile() { ::close(file_); }
   MemoryFile(const MemoryFile&) = delete;
@@ -80,7 +80,7 @@ class Folder {
       : Folder(::access(kMemory, W_OK) == 0 ? kMemory : std::filesystem::temp_directory_path()) {}
   explicit Folder(const std::filesystem::path& where) {
     std::string name = (where / "fuzzXXXXXX").string();
-    Require(::mkdtemp(name.data()) != nullptr, "no folder for files");
+    Require(::mkdtemp(name.data()) != nullptr, "cannot create a temporary folder");
     path_ = name;
   }
   ~Folder() {

@@ -9,8 +9,9 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const MemoryFile file(TextOf(data, size));
   static_cast<void>(Accepts([&] {
     for (const auto& sensor : alidade::ReadInnovations(file.path())) {
-      Require(sensor.measurements > 0, "a sensor without measurements");
-      Require(sensor.nis_within95 >= 0.0 && sensor.nis_within95 <= 1.0, "not a share");
+      Require(sensor.measurements > 0, "a sensor has no measurements");
+      Require(sensor.nis_within95 >= 0.0 && sensor.nis_within95 <= 1.0,
+              "a fraction is outside 0 to 1");
     }
   }));
   return 0;

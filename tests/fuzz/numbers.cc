@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The input is a number or timestamp as text. The result is compared with that of the C library and
-// of 128-bit integers.
+// The input is a number or timestamp as text. The result is compared with those of the C library
+// and of 128-bit integers.
 #include <cmath>
 #include <cstring>
 
@@ -62,20 +62,20 @@ void CheckNumber(const std::string& text) {
   const double expected = std::strtod(text.c_str(), &end);
   if (!read) {
     const bool out_of_range = std::isinf(expected) || expected == 0.0;
-    Require(!IsDecimal(text) || out_of_range, "a number is refused");
+    Require(!IsDecimal(text) || out_of_range, "a valid number is refused");
     return;
   }
-  Require(IsDecimal(text) && *end == '\0' && SameBits(value, expected), "another number");
+  Require(IsDecimal(text) && *end == '\0' && SameBits(value, expected), "a wrong number is read");
   static_cast<void>(Accepts([&] {
     const Config config = Config::FromText("x: " + text, "numbers");
-    Require(SameBits(config.root().At("x").Number(), expected), "another number in a config");
+    Require(SameBits(config.root().At("x").Number(), expected), "a config reads a wrong number");
   }));
   for (const std::size_t digits : {0, 3, 6, 9}) {
     const double t_s = value * std::pow(10.0, static_cast<double>(digits) - 9.0);
     if (!(std::abs(t_s) < cell::kTimeLimit)) continue;
     const Timestamp timestamp = cell::ParseTimestamp(text, value, digits);
     if (text.find_first_of("eE") == text.npos)
-      Require(timestamp == Exact(text, digits), "another timestamp");
+      Require(timestamp == Exact(text, digits), "a wrong timestamp is read");
   }
 }
 
@@ -87,8 +87,8 @@ void CheckTexts(const std::string& bytes) {
   std::memcpy(&timestamp, bytes.data(), sizeof timestamp);
   const std::string text = internal::NumberText(value);
   const bool read = cell::ParseNumber(text, again) == nullptr;
-  Require(read == std::isfinite(value), "a number that is written is refused");
-  Require(!read || SameBits(value, again), "a number that is written is read as another");
+  Require(read == std::isfinite(value), "a written number is refused");
+  Require(!read || SameBits(value, again), "a written number is read as another one");
   for (const int decimals : {0, 6, 17}) {
     static_cast<void>(internal::FixedText(value, decimals));
     static_cast<void>(internal::RoundedText(value, decimals));
@@ -96,9 +96,10 @@ void CheckTexts(const std::string& bytes) {
   }
   std::string seconds;
   internal::AppendSeconds(seconds, timestamp);
-  Require(cell::ParseNumber(seconds, again) == nullptr, "seconds are refused");
+  Require(cell::ParseNumber(seconds, again) == nullptr, "a written timestamp is not a number");
   if (!(std::abs(again) < cell::kTimeLimit)) return;
-  Require(cell::ParseTimestamp(seconds, again, 9) == timestamp, "a timestamp is read as another");
+  Require(cell::ParseTimestamp(seconds, again, 9) == timestamp,
+          "a written timestamp is read as another");
 }
 
 }  // namespace

@@ -28,13 +28,13 @@ inline void ReadSource(std::unique_ptr<Source> (*create)(const SourceArguments&)
       while (source->Next(frame)) {
         for (const Measurement& one : frame.measurements) {
           const auto& streams = source->streams();
-          Require(one.stream >= 0 && one.stream < std::ssize(streams), "no such stream");
+          Require(one.stream >= 0 && one.stream < std::ssize(streams), "the stream does not exist");
           const StreamInfo& stream = streams[static_cast<std::size_t>(one.stream)];
-          Require(std::ssize(one.values) == stream.size, "another size than the stream says");
+          Require(std::ssize(one.values) == stream.size, "the size is not that of the stream");
           Require(std::ssize(one.known) == stream.known,
-                  "other known numbers than the stream says");
+                  "the count of known numbers is not that of the stream");
         }
-        Require(frame.truth.size() <= source->truths().size(), "a truth of nothing");
+        Require(frame.truth.size() <= source->truths().size(), "the frame has too many truths");
       }
     }));
   }

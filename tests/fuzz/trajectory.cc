@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The input has two bytes of options, then a reference and an estimate in any format.
+// The input contains two bytes of options, then a reference and an estimate in any format.
 #include "alidade/evaluate/evaluate.h"
 #include "fuzz.h"
 
@@ -29,13 +29,13 @@ void Read(unsigned bits, const std::vector<std::string>& parts) {
   const TrajectoryFormat format = kFormats[bits >> 11 & 3];
   const MemoryFile first(parts[0]), second(parts[1]);
   const Trajectory reference = ReadTrajectory(first.path(), format);
-  Require(reference.size() > 0, "a trajectory without poses");
+  Require(reference.size() > 0, "a trajectory has no poses");
   for (std::size_t i = 1; i < reference.timestamps.size(); ++i) {
-    Require(reference.timestamps[i - 1] <= reference.timestamps[i], "timestamps go back");
+    Require(reference.timestamps[i - 1] <= reference.timestamps[i], "timestamps do not ascend");
   }
   const Trajectory estimate = ReadTrajectory(second.path());
   const Evaluation evaluation = Evaluate(reference, estimate, OptionsOf(bits));
-  Require(evaluation.estimate.size() == evaluation.reference.size(), "poses without a partner");
+  Require(evaluation.estimate.size() == evaluation.reference.size(), "a pose has no partner");
 }
 
 }  // namespace

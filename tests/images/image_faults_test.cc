@@ -20,13 +20,14 @@ namespace {
 using testing::Contains;
 using testing::Outcome;
 
-/// A camera with faults looks at a wall, and features are tracked in its images. Image k shows the
-/// wall from (u, v) = shown_[k] on. A point at p in image j is at p + shown_[j] - shown_[k] in
-/// image k, so the true position of each feature is known.
+/// A camera with faults looks at a wall, and features are tracked in its images. The top left pixel
+/// of image k shows the point (u, v) = shown_[k] of the wall. A point at p in image j is at p +
+/// shown_[j] - shown_[k] in image k, so the true position of each feature is known.
 class ImageFaults : public testing::ProgramTest {
  protected:
   static constexpr int kImages = 20, kFeatures = 40;
-  static constexpr double kFalse = 0.5;  ///< px; a correct track has less than half of this error
+  static constexpr double kFalse = 0.5;  ///< error of a false track, in px; a correct track has
+                                         ///< less than half of this error
 
   struct Seen {
     int feature;
@@ -36,7 +37,7 @@ class ImageFaults : public testing::ProgramTest {
 
   void SetUp() override {
     ProgramTest::SetUp();
-    before_ = "ulimit -t 60";  // s of CPU time; a run takes 1 s, and an endless run is killed
+    before_ = "ulimit -t 60";  // CPU time in s; a run takes 1 s, and an endless run is killed
     Write("config.yaml", R"(alidade: 1
 source: {type: image_tracks, path: images, rate_hz: 20, features: 40}
 )");
@@ -104,7 +105,7 @@ source: {type: image_tracks, path: images, rate_hz: 20, features: 40}
         std::ranges::count_if(after, [&](int id) { return before.contains(id); }));
   }
 
-  /// Expects three properties of each feature: it stays at its point of the wall, it has at most
+  /// Checks three properties of each feature: it remains at its point of the wall, it has at most
   /// one measurement in an image, and it does not return after it has ended.
   void ExpectTrue(const ByImage& found) const {
     struct Life {
@@ -118,7 +119,7 @@ source: {type: image_tracks, path: images, rate_hz: 20, features: 40}
         const auto [life, is_new] = lives.try_emplace(one.feature, Life{one.at + shown, image});
         if (is_new) continue;
         EXPECT_EQ(life->second.last, image - 1) << "feature " << one.feature << " of image "
-                                                << image << " had ended, or is there twice";
+                                                << image << " had ended before, or occurs twice";
         EXPECT_LT(cv::norm(one.at + shown - life->second.on_wall), kFalse)
             << "feature " << one.feature << " of image " << image;
         life->second.last = image;
@@ -127,7 +128,7 @@ source: {type: image_tracks, path: images, rate_hz: 20, features: 40}
   }
 
   cv::Mat wall_;
-  std::vector<cv::Point2d> shown_;  ///< px of the wall, one entry for each image
+  std::vector<cv::Point2d> shown_;  ///< top left pixel of each image, in px of the wall
 };
 
 TEST_F(ImageFaults, WithoutAnyFeaturesLive) {
@@ -147,8 +148,8 @@ TEST_F(ImageFaults, BlackImagesEndAllFeatures) {
   ExpectTrue(found);
   for (const int k : {0, 8, 9, 10}) EXPECT_FALSE(found.contains(k)) << k;
   EXPECT_EQ(Shared(found, 7, 11), 0u);
-  // In the first image after the cut, new features are found in the whole image. They are then
-  // tracked.
+  // In the first image after the cut, new features are found in the whole image. Later images track
+  // these features.
   for (const int k : {1, 11}) EXPECT_GT(IdsOf(found, k).size(), 35u) << k;
   EXPECT_GT(Shared(found, 11, 12), 35u);
 }
@@ -174,7 +175,7 @@ TEST_F(ImageFaults, AFrozenImageMovesNothing) {
 TEST_F(ImageFaults, DuplicatedImagesAreFollowedBackAndForth) {
   shown_[6] = shown_[5];  // images 5 and 7 are each sent twice
   shown_[8] = shown_[7];
-  shown_[11] = shown_[9];  // two images, then the same two images again
+  shown_[11] = shown_[9];  // images 9 and 10 are sent twice as a pair
   shown_[12] = shown_[10];
   WriteImages();
   const ByImage found = Track();
@@ -220,7 +221,7 @@ TEST_F(ImageFaults, AnImageWithoutATimeEndsTheRun) {
   Write("images/timestamps.csv", rows);
   const Outcome outcome = Simulate({"--set", "source.rate_hz=0"});
   EXPECT_EQ(outcome.code, 65) << outcome.err;
-  EXPECT_TRUE(Contains(outcome.err, "no time for image 9")) << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err, "there is no time for image 9")) << outcome.err;
 }
 
 // The image jumps by half its size and back. No feature is tracked across the jump, and no two

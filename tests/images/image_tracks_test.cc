@@ -118,7 +118,7 @@ class ImageTracks : public testing::ProgramTest {
   }
 };
 
-/// Returns the true feature that is nearest to `found`, and the distance between them.
+/// Returns the true feature that is nearest to `found`, and its distance from `found`.
 std::pair<int, double> Nearest(const std::vector<Seen>& truth, const Seen& found) {
   std::pair<int, double> nearest{-1, 1e9};
   for (const Seen& t : truth) {
@@ -148,7 +148,7 @@ TEST_F(ImageTracks, FollowOneThingAsLongAsTheyLive) {
     EXPECT_LE(features.size(), 40u);
     std::set<int> ids;
     for (const Seen& one : features) {
-      EXPECT_TRUE(ids.insert(one.feature).second) << "twice in frame " << frame;
+      EXPECT_TRUE(ids.insert(one.feature).second) << "a feature occurs twice in frame " << frame;
       Life& life = lives[one.feature];
       for (const Seen& t : truth.at(frame)) {
         if (life.of < 0 || t.feature != life.of) continue;
@@ -156,7 +156,7 @@ TEST_F(ImageTracks, FollowOneThingAsLongAsTheyLive) {
       }
       if (life.frames++ == 0) {
         const auto [of, off] = Nearest(truth.at(frame), one);
-        if (off > 6.0) continue;  // excludes corners of the image number and of discs that touch
+        if (off > 6.0) continue;  // excludes corners of the drawn number and of discs that touch
         life.of = of;
         for (const Seen& t : truth.at(frame)) {
           if (t.feature == of) life.du = one.u - t.u, life.dv = one.v - t.v;
@@ -188,8 +188,8 @@ TEST_F(ImageTracks, AreSpreadAndApart) {
   }
 }
 
-// A small square has four corners, but refinement moves all of them to one stable point, its
-// centre.
+// A small square has four corners, but refinement moves all four corners to one stable point, the
+// centre of the square.
 TEST_F(ImageTracks, DoNotShareAPoint) {
   Write("config.yaml", R"(alidade: 1
 source:
@@ -251,16 +251,17 @@ TEST_F(ImageTracks, RefuseWhatIsNoImage) {
   std::filesystem::resize_file(ImageFile(7), std::filesystem::file_size(ImageFile(7)) / 2);
   const Outcome cut = Track();
   EXPECT_EQ(cut.code, 65) << cut.err;
-  EXPECT_TRUE(Contains(cut.err, "000007.png: the image is cut short")) << cut.err;
+  EXPECT_TRUE(Contains(cut.err, "000007.png: the image file is incomplete")) << cut.err;
   EXPECT_FALSE(Contains(cut.err, "libpng")) << cut.err;
   std::filesystem::resize_file(ImageFile(7), 0);
   const Outcome empty = Track();
   EXPECT_EQ(empty.code, 65) << empty.err;
-  EXPECT_TRUE(Contains(empty.err, "000007.png: an empty file")) << empty.err;
+  EXPECT_TRUE(Contains(empty.err, "000007.png: the file is empty")) << empty.err;
   cv::imwrite(ImageFile(7), cv::Mat(120, 160, CV_8UC1, cv::Scalar(9)));
   const Outcome small = Track();
   EXPECT_EQ(small.code, 65) << small.err;
-  EXPECT_TRUE(Contains(small.err, "000007.png: 160x120 px, but the first image is 320x240 px"))
+  EXPECT_TRUE(Contains(small.err,
+                       "000007.png: the image has 160x120 px, but the first image has 320x240 px"))
       << small.err;
 }
 
@@ -272,8 +273,9 @@ TEST_F(ImageTracks, AreOfImagesAsLargeAsTheCamera) {
         "0}\nsource: {type: image_tracks, path: scene/images, rate_hz: 20, start_frame: 2}\n");
   const Outcome other = Track();
   EXPECT_EQ(other.code, 65) << other.err;
-  EXPECT_TRUE(
-      Contains(other.err, "000002.png: 320x240 px, but the camera of config.yaml:2 is 640x480 px"))
+  EXPECT_TRUE(Contains(other.err,
+                       "000002.png: the image has 320x240 px, but the camera of config.yaml:2 has "
+                       "640x480 px"))
       << other.err;
   EXPECT_EQ(Track({"--set", "camera.width=320", "--set", "camera.height=240"}).code, 0);
 
@@ -287,13 +289,14 @@ TEST_F(ImageTracks, AreOfImagesAsLargeAsTheCamera) {
                             "sensors.pixels.camera={model: pinhole, width: 319, height: 240, fx: "
                             "260, fy: 260, cx: 160, cy: 120}"});
   EXPECT_EQ(own.code, 65) << own.err;
-  EXPECT_TRUE(Contains(own.err, "000000.png: 320x240 px, but the camera of")) << own.err;
+  EXPECT_TRUE(Contains(own.err, "000000.png: the image has 320x240 px, but the camera of"))
+      << own.err;
   Write("config.yaml", kFollow);
   Write("scene/images/calibration.yaml",
         "camera: {model: pinhole, width: 640, height: 480, fx: 1, fy: 1, cx: 0, cy: 0}\n");
   const Outcome beside = Track();
   EXPECT_EQ(beside.code, 65) << beside.err;
-  EXPECT_TRUE(Contains(beside.err, "calibration.yaml:1:33 is 640x480 px")) << beside.err;
+  EXPECT_TRUE(Contains(beside.err, "calibration.yaml:1:33 has 640x480 px")) << beside.err;
   EXPECT_EQ(Track({"--set", "source.calibration=ignore"}).code, 0);
 }
 
@@ -306,13 +309,13 @@ TEST_F(ImageTracks, BeginAtAnImageThatIsThere) {
   const Outcome folder = Track();
   EXPECT_EQ(folder.code, 78) << folder.err;
   EXPECT_TRUE(Contains(folder.err,
-                       "config.yaml:4:17 source.start_frame: 20, but there are 20 images, counted "
-                       "from 0; expected at most 19"))
+                       "config.yaml:4:17 source.start_frame: image 20 does not exist; the source "
+                       "has 20 images, counted from 0; expected at most 19"))
       << folder.err;
   MakeImages({"--video", "video.avi", "--force"});
   const Outcome video = Track({"--set", "source.path=scene/video.avi"});
   EXPECT_EQ(video.code, 78) << video.err;
-  EXPECT_TRUE(Contains(video.err, "start_frame: 20, but there are 20 images")) << video.err;
+  EXPECT_TRUE(Contains(video.err, "start_frame: image 20 does not exist")) << video.err;
 }
 
 TEST_F(ImageTracks, AreNotOfImagesSmallerThanTheirPatch) {
@@ -322,9 +325,10 @@ TEST_F(ImageTracks, AreNotOfImagesSmallerThanTheirPatch) {
   EXPECT_EQ(Track(of_small).code, 0);
   const Outcome refused = Track({of_small[0], of_small[1], "--set", "source.window_px=101"});
   EXPECT_EQ(refused.code, 65) << refused.err;
-  EXPECT_TRUE(Contains(refused.err, "s.png: 102x102 px, smaller than a tracked patch of 101 px"))
+  EXPECT_TRUE(Contains(
+      refused.err, "s.png: the image has 102x102 px, but a tracked patch of 101 px with its rim"))
       << refused.err;
-  EXPECT_TRUE(Contains(refused.err, "103 px or more")) << refused.err;
+  EXPECT_TRUE(Contains(refused.err, "at least 103 px")) << refused.err;
 }
 
 // The decoder returns an image of full size, in which the missing part is grey.
@@ -337,7 +341,7 @@ TEST_F(ImageTracks, RefuseAJpegThatIsCutShort) {
   std::filesystem::resize_file(jpeg, std::filesystem::file_size(jpeg) * 3 / 4);
   const Outcome cut = Track();
   EXPECT_EQ(cut.code, 65) << cut.err;
-  EXPECT_TRUE(Contains(cut.err, "000003.jpg: the image is cut short")) << cut.err;
+  EXPECT_TRUE(Contains(cut.err, "000003.jpg: the image file is incomplete")) << cut.err;
 }
 
 TEST_F(ImageTracks, EndInABlackImageAndBeginAnewAfterIt) {
@@ -353,7 +357,7 @@ TEST_F(ImageTracks, EndInABlackImageAndBeginAnewAfterIt) {
   for (const Seen& one : found.at(10)) EXPECT_FALSE(before.contains(one.feature));
 }
 
-// The camera is frozen. A repeated image has the same features as the image before.
+// The camera is frozen. A repeated image has the same features as the previous image.
 TEST_F(ImageTracks, StandStillInAFrozenImage) {
   MakeImages();
   std::filesystem::copy_file(ImageFile(8), ImageFile(9),
@@ -437,16 +441,18 @@ TEST_F(ImageTracks, HaveTheTimesOfTheLayoutsOfEurocTumAndKitti) {
   Write("tum/rgb.txt", tum.substr(0, tum.find("1305031455")));
   const Outcome no_time = track("tum/rgb");
   EXPECT_EQ(no_time.code, 65);
-  EXPECT_TRUE(Contains(no_time.err, "rgb.txt: no time for image 000003.png")) << no_time.err;
+  EXPECT_TRUE(Contains(no_time.err, "rgb.txt: there is no time for image 000003.png"))
+      << no_time.err;
   Write("kitti/times.txt", kitti + "30\n");
   const Outcome one_more = track("kitti/image_0");
   EXPECT_EQ(one_more.code, 65);
   EXPECT_TRUE(Contains(one_more.err,
-                       "times.txt:21: a time for image 20, but there are 20 "
+                       "times.txt:21: there is a time for image 20, but the source has 20 "
                        "images"))
       << one_more.err;
   Write("kitti/times.txt", "\n");
-  EXPECT_TRUE(Contains(track("kitti/image_0").err, "no rows")) << track("kitti/image_0").err;
+  EXPECT_TRUE(Contains(track("kitti/image_0").err, "contains no rows"))
+      << track("kitti/image_0").err;
 }
 
 TEST_F(ImageTracks, ADeviceThatIsNoCameraIsNamed) {
@@ -456,7 +462,7 @@ TEST_F(ImageTracks, ADeviceThatIsNoCameraIsNamed) {
   ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
   const Outcome pipe = Track({"--set", "source.path=pipe"});
   EXPECT_EQ(pipe.code, 65);
-  EXPECT_TRUE(Contains(pipe.err, "pipe: not a file")) << pipe.err;
+  EXPECT_TRUE(Contains(pipe.err, "pipe: this is not a regular file")) << pipe.err;
 }
 
 TEST_F(ImageTracks, AnImageThatIsGoneIsMissedByItsTime) {
@@ -470,7 +476,7 @@ TEST_F(ImageTracks, AnImageThatIsGoneIsMissedByItsTime) {
   const Outcome gone = Track(by_table);
   EXPECT_EQ(gone.code, 65);
   EXPECT_TRUE(Contains(gone.err,
-                       "timestamps.csv:20: a time for image 19, but there are 19 "
+                       "timestamps.csv:20: there is a time for image 19, but the source has 19 "
                        "images"))
       << gone.err;
 }
@@ -489,7 +495,8 @@ TEST_F(ImageTracks, AllTimesAreCheckedBeforeTheFirstImage) {
   };
   const Outcome outcome = run({});
   EXPECT_EQ(outcome.code, 65);
-  EXPECT_TRUE(Contains(outcome.err, "timestamps.csv:16: no time for image 15")) << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err, "timestamps.csv:16: there is no time for image 15"))
+      << outcome.err;
   EXPECT_FALSE(Exists("run"));
   EXPECT_EQ(run({"--set", "source.max_frames=15"}).code, 0);
 }
@@ -579,7 +586,7 @@ TEST_F(ImageTracks, LeadTheFilterAsPerfectTracksDo) {
   const double perfect =
       rmse_of("source={type: tracks, path: " + (folder_ / "room").string() + "}");
   EXPECT_GT(perfect, 0.0003);
-  EXPECT_LT(perfect, 0.002);  // in m
+  EXPECT_LT(perfect, 0.002);  // both errors are in m
   RecordProperty("seen_and_perfect_m", std::to_string(seen) + ' ' + std::to_string(perfect));
   EXPECT_LT(seen, 1.5 * perfect);
 }
@@ -620,7 +627,8 @@ TEST_F(ImageTracks, AreFoundWhereTheFilterExpectsThem) {
     return sum / static_cast<double>(images.size());
   };
   const double guided = followed("ekf"), alone = followed("none");
-  EXPECT_GT(guided, 2.0 * alone) << "images a feature is in: " << guided << " and " << alone;
+  EXPECT_GT(guided, 2.0 * alone) << "mean number of images per feature: " << guided << " with and "
+                                 << alone << " without the filter";
 }
 
 /// Predicts each feature at its previous position, with a small covariance. The predictions of the
@@ -713,8 +721,8 @@ class EstimatedNoise : public ImageTracks {
     grey.convertTo(image, CV_8U);
     ASSERT_TRUE(cv::imwrite(ImageFile(k), image));
   }
-  /// Calls take(first, now) for each feature of the first image in each later image that has the
-  /// feature.
+  /// Calls take(first, now) for each feature of the first image and each later image that contains
+  /// this feature.
   template <class Take>
   void Follow(const Take& take) const {
     Config config = Config::FromFile((folder_ / "config.yaml").string());
@@ -753,8 +761,8 @@ TEST_F(EstimatedNoise, IsThatOfThePlacesThatAreFound) {
     ++count;
   });
   ASSERT_GT(count, 20 * kImages);
-  // The variance from 600 positions is accurate to 6 %. The variance estimated from 25 cells with
-  // six fitted parameters is a fifth too small.
+  // The variance computed from 600 positions is accurate to 6 %. The variance estimated from 25
+  // cells with six fitted parameters is a fifth too small.
   EXPECT_GT(of_places / count, 1e-4);
   EXPECT_NEAR(told / of_places, 0.85, 0.25) << told << " of " << of_places;
 }
@@ -784,8 +792,8 @@ TEST_F(EstimatedNoise, IsLargeOfPatchesThatMoveInParts) {
   EXPECT_GT(across / is_across, 4.0 * beside / is_beside);
 }
 
-// The predictions have a large error, so they are ignored: all features are found, as without a
-// filter.
+// The predictions have a large error, so they are ignored. All features are found, as they are
+// without a filter.
 TEST_F(ImageTracks, AreFoundWithoutAGuideThatIsFarOff) {
   Write("config.yaml", kGuided);
   MakeImages();
@@ -856,7 +864,8 @@ TEST_F(ImageTracks, AGuideIsAFilterOfTheConfig) {
   MakeImages();
   const Outcome unknown = Call({"run", "config.yaml", "--set", "source.guide=ekff"});
   EXPECT_EQ(unknown.code, 78);
-  EXPECT_TRUE(Contains(unknown.err, "source.guide: no estimator 'ekff'")) << unknown.err;
+  EXPECT_TRUE(Contains(unknown.err, "source.guide: estimator 'ekff' does not exist"))
+      << unknown.err;
   EXPECT_TRUE(Contains(unknown.err, "did you mean 'ekf'")) << unknown.err;
   const Outcome held = Call({"run", "config.yaml", "--set", "out_of_sequence={policy: buffer}"});
   EXPECT_EQ(held.code, 78);
@@ -867,7 +876,7 @@ TEST_F(ImageTracks, AGuideIsAFilterOfTheConfig) {
   EXPECT_EQ(batch.code, 78);
   EXPECT_TRUE(Contains(batch.err, "estimator 'ekf' (ceres_batch) cannot predict measurements"))
       << batch.err;
-  EXPECT_TRUE(Contains(batch.err, "expected none, as `estimators` has no recursive filter"))
+  EXPECT_TRUE(Contains(batch.err, "expected a recursive filter; add one to `estimators`"))
       << batch.err;
   const Outcome other = Call({"run", "config.yaml", "--set", "estimators.all={type: ceres_batch}",
                               "--set", "source.guide=all"});
@@ -976,7 +985,7 @@ TEST_F(ImageTracks, AKnownTargetGivesARecordedDeskItsScale) {
   const std::filesystem::path frames =
       std::filesystem::path(data == nullptr ? "" : data) / "mono-davison-desk/frames";
   if (data == nullptr || !std::filesystem::exists(frames)) {
-    GTEST_SKIP() << "ALIDADE_DATA has no mono-davison-desk";
+    GTEST_SKIP() << "ALIDADE_DATA does not contain mono-davison-desk";
   }
   const std::string example =
       std::string(ALIDADE_SOURCE_DIR) + "/examples/29_slam_recorded_images/config.yaml";

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// `alidade run --save-video`: the contents of the video, and the cases in which the program refuses
-// to write it.
+// Tests `alidade run --save-video`: the contents of the video, and the cases in which the program
+// refuses to write it.
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -21,7 +21,7 @@ using testing::Contains;
 using testing::Outcome;
 
 // The scene has four points on a textured plate 4 m ahead. The camera moves sideways from x = 0 to
-// 0.3 m. It sees a point at u = 159.5 + 250 (X - x) / 4, v = 119.5 + 250 Y / 4.
+// 0.3 m. It sees the point (X, Y) at u = 159.5 + 250 (X - x) / 4, v = 119.5 + 250 Y / 4.
 const std::string kPlate = R"(alidade: 1
 title: A plate
 camera: {model: pinhole, width: 320, height: 240, fx: 250, fy: 250, cx: 159.5, cy: 119.5}
@@ -72,7 +72,7 @@ class RunView : public testing::ProgramTest {
     return cv::mean(frame(cv::Rect(x - 1, y - 1, 3, 3)));
   }
   /// Returns true if the channel 0, 1 or 2 (blue, green, red) is clearly brighter than the other
-  /// two.
+  /// two channels.
   static bool Is(const cv::Scalar& colour, int channel) {
     for (int other = 0; other < 3; ++other) {
       if (other != channel && colour[channel] < colour[other] + 50.0) return false;
@@ -93,8 +93,8 @@ TEST_F(RunView, TheVideoHasEachFrameAndItsFeaturesInTheirColours) {
   for (const cv::Mat& frame : frames) EXPECT_EQ(frame.size(), cv::Size(kWidth, kHeight));
   const cv::VideoCapture video((folder_ / "plate.avi").string(), cv::CAP_OPENCV_MJPEG);
   EXPECT_EQ(video.get(cv::CAP_PROP_FPS), 10.0);
-  // Each frame is complete: even the last block of the panel has the panel's grey. Another
-  // reader finds all frames.
+  // Each frame is complete: even the last block of the panel has the grey of the panel. The default
+  // video reader of OpenCV also finds all frames.
   for (const cv::Mat& frame : frames) {
     const cv::Scalar last = cv::mean(frame(cv::Rect(kWidth - 8, kHeight - 8, 8, 8)));
     for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(last[channel], 27.0, 6.0);
@@ -130,8 +130,8 @@ TEST_F(RunView, RejectedFeaturesAreRed) {
   }
 }
 
-// The video shows the 3-sigma ellipse of the innovation. R alone makes it at least 6 px large, and
-// S makes it larger.
+// The video shows the 3-sigma ellipse of the innovation. R alone makes the ellipse at least 6 px
+// large, and S makes the ellipse larger.
 TEST_F(RunView, TheInnovationHasItsEllipse) {
   ASSERT_EQ(Run(kPlate, {"--save-video", "p.avi"}).code, 0);
   const cv::Mat frame = Frames("p.avi").at(4);
@@ -145,7 +145,7 @@ TEST_F(RunView, TheInnovationHasItsEllipse) {
       const double away = std::hypot(x, y) / kTimes;  // distance in px of the source's image
       if (!Is(colour, 1)) continue;
       if (away > 5.5 && away < 12.0) ++ring;
-      if (away > 2.5 && away < 5.0 && std::abs(y) > 4) ++inside;  // y: excludes the tail
+      if (away > 2.5 && away < 5.0 && std::abs(y) > 4) ++inside;  // the test of y excludes the tail
     }
   }
   EXPECT_GT(ring, 60);
@@ -181,7 +181,7 @@ TEST_F(RunView, ShowsTheImagesThatFeaturesWereFoundIn) {
 }
 
 // In the first image the target is 90 px wide and starts at (75, 45). The outline is drawn 3.5 px
-// inside its edges.
+// inside the edges of the target.
 TEST_F(RunView, ShowsTheOutlineOfATarget) {
   Write("scene.yaml", R"(alidade: 1
 source:
@@ -205,7 +205,7 @@ source:
   const std::vector<cv::Mat> frames = Frames("target.avi");
   ASSERT_EQ(frames.size(), 7u);
   ASSERT_EQ(frames[0].size(), cv::Size(4 * 240 + 400, 720));
-  const auto green_columns = [&](int from, int to) {  // in the row through the target's middle
+  const auto green_columns = [&](int from, int to) {  // counts in the middle row
     int count = 0;
     for (int x = from; x < to; ++x) {
       const cv::Vec3b at = frames[0].at<cv::Vec3b>(360, x);
@@ -225,8 +225,8 @@ TEST_F(RunView, RefusesWhatItCannotShow) {
   const Outcome blind = Call({"run", "table.yaml", "-o", "run", "--save-video", "v.avi"});
   EXPECT_EQ(blind.code, 78);
   EXPECT_TRUE(Contains(blind.err,
-                       "source: the source has no images to show; expected a source that measures "
-                       "in images, or draws images from `surfaces`"))
+                       "source: the source has no images to show; expected a source with images, "
+                       "such as image_tracks, or scene with `surfaces`"))
       << blind.err;
   EXPECT_FALSE(Exists("run"));
   EXPECT_FALSE(Exists("v.avi"));
@@ -234,7 +234,7 @@ TEST_F(RunView, RefusesWhatItCannotShow) {
   const Outcome buffered = Run(kPlate, {"--save-video", "v.avi", "--set",
                                         "out_of_sequence={policy: buffer, window_s: 0.1}"});
   EXPECT_EQ(buffered.code, 78);
-  EXPECT_TRUE(Contains(buffered.err, "out_of_sequence.policy: frames are not processed in"))
+  EXPECT_TRUE(Contains(buffered.err, "out_of_sequence.policy: this policy reorders frames"))
       << buffered.err;
 }
 
@@ -250,7 +250,7 @@ TEST_F(RunView, RefusesWhatItCannotWrite) {
   Write("v.avi", "mine");
   const Outcome there = Run(kPlate, {"--save-video", "v.avi"});
   EXPECT_EQ(there.code, 73);
-  EXPECT_TRUE(Contains(there.err, "v.avi: exists; --force replaces it")) << there.err;
+  EXPECT_TRUE(Contains(there.err, "v.avi: the file exists; --force replaces it")) << there.err;
   EXPECT_EQ(Read("v.avi"), "mine");
   EXPECT_FALSE(Exists("run"));
   EXPECT_EQ(Run(kPlate, {"--save-video", "v.avi", "--force"}).code, 0);
@@ -266,8 +266,8 @@ TEST_F(RunView, AWindowNeedsADisplay) {
   const Outcome outcome = Run(kPlate, {"--view"});
   EXPECT_EQ(outcome.code, 73);
   EXPECT_TRUE(Contains(outcome.err,
-                       "--view: there is no display: DISPLAY is not set; expected a graphical "
-                       "session; --save-video FILE.avi does not need a display"))
+                       "--view: there is no display, because DISPLAY is not set; expected a "
+                       "graphical session; --save-video FILE.avi does not need a display"))
       << outcome.err;
   EXPECT_FALSE(Exists("run"));
 
@@ -275,7 +275,7 @@ TEST_F(RunView, AWindowNeedsADisplay) {
   const Outcome nobody = Run(kPlate, {"--view"});
   ::unsetenv("DISPLAY");
   EXPECT_EQ(nobody.code, 73) << nobody.err;
-  EXPECT_TRUE(Contains(nobody.err, "--view: no window can be opened")) << nobody.err;
+  EXPECT_TRUE(Contains(nobody.err, "--view: the window cannot be opened")) << nobody.err;
   EXPECT_FALSE(Exists("run"));
 }
 

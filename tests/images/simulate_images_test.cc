@@ -79,8 +79,8 @@ class SimulateImages : public testing::ProgramTest {
 // kRadius is in px. The grey value of the drawn frame number is below kDark.
 constexpr double kRadius = 4.0, kDark = 60.0;
 
-/// Returns the largest distance between the centroid of a disc and its point, px. Discs that touch
-/// another disc or the border are skipped; `count` counts the others.
+/// Returns the largest distance, in px, between the centroid of a disc and its point. Discs that
+/// touch another disc or the border are skipped; `count` counts the others.
 double LargestError(const cv::Mat& image, const std::map<int, Pixel>& points, int& count) {
   double largest = 0.0;
   for (const auto& [feature, p] : points) {
@@ -122,7 +122,7 @@ TEST_F(SimulateImages, DiscsLieWhereTheTracksSay) {
     ASSERT_EQ(image.size(), cv::Size(320, 240));
     ASSERT_EQ(frames[static_cast<std::size_t>(k)].size(), cv::Size(320, 240));
     // OpenCV draws smoothed discs. For each of 16 x 16 sub-pixel positions the centroid is within
-    // 0.06 px of the centre. JPEG adds its losses.
+    // 0.06 px of the centre. JPEG compression increases the error.
     EXPECT_LT(LargestError(image, pixels.at(k), seen), 0.1) << "frame " << k;
     const cv::Mat& frame = frames[static_cast<std::size_t>(k)];
     EXPECT_LT(LargestError(frame, pixels.at(k), seen_again), 0.5) << "frame " << k;
@@ -141,7 +141,7 @@ TEST_F(SimulateImages, AreAllAlikeAndOfNothingElse) {
   const double one = M_PI * (kRadius + 0.5) * (kRadius + 0.5) * (255.0 - kDark);
   const auto count = static_cast<double>(pixels.at(0).size());
   EXPECT_LT(total, 1.1 * count * one);
-  // Some discs touch, or the border cuts them.
+  // Some discs touch each other, or are cut by the border.
   EXPECT_GT(total, 0.7 * count * one);
 }
 
@@ -164,8 +164,8 @@ TEST_F(SimulateImages, RefusesWhatItCannotWrite) {
   const Outcome outside = Simulate(kScene, {"--images", "../images"});
   EXPECT_EQ(outside.code, 77) << outside.err;
   EXPECT_TRUE(Contains(outside.err,
-                       "--images: '../images' leaves its folder; expected a path "
-                       "inside the output folder"))
+                       "--images: '../images' is outside the output folder; expected a "
+                       "relative path inside this folder"))
       << outside.err;
   EXPECT_EQ(Simulate(kScene, {"--video", "/tmp/v.avi"}).code, 77);
   Write("table.yaml", testing::kTableConfig);
@@ -220,8 +220,8 @@ source:
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return cv::imread((folder_ / folder / "images/000000.png").string(), cv::IMREAD_GRAYSCALE);
   };
-  // Textures are assigned in the order of the list. A rectangle that is out of view takes the place
-  // of the wall, so the textures of the other surfaces do not change.
+  // Textures are assigned in the order of the list. A rectangle that is out of view replaces the
+  // wall, so the textures of the other surfaces do not change.
   const char* const kAway = "{rectangle: {corner: [0, 0, -5], right: [1, 0, 0], down: [0, 1, 0]}}";
   const std::string wall =
       "{rectangle: {corner: [-5, -5, 4], right: [10, 0, 0], down: [0, 10, 0]}}";
@@ -236,16 +236,17 @@ source:
   EXPECT_GT(cv::countNonZero(scene), 80 * 60 * 9 / 10);
 }
 
-// Blocks have 512 bytes. Each file but the video fits into 16 blocks. An image needs more than 2.
+// Blocks have 512 bytes. Each file except the video fits into 16 blocks. An image needs more than 2
+// blocks.
 TEST_F(SimulateImages, AFullDiskIsAnError) {
   before_ = "ulimit -f 16";
   const Outcome video = Simulate(kScene, {"--video", "v.avi"});
   EXPECT_EQ(video.code, 74) << video.err;
-  EXPECT_TRUE(Contains(video.err, "data.partial/v.avi: cannot be written in full")) << video.err;
+  EXPECT_TRUE(Contains(video.err, "data.partial/v.avi: the video cannot be written")) << video.err;
   before_ = "ulimit -f 2";
   const Outcome images = Simulate(kScene, {"--images", "images"});
   EXPECT_EQ(images.code, 74) << images.err;
-  EXPECT_TRUE(Contains(images.err, "data.partial/images/000000.png: cannot be written"))
+  EXPECT_TRUE(Contains(images.err, "data.partial/images/000000.png: the file cannot be written"))
       << images.err;
   EXPECT_FALSE(Exists("data"));
 }

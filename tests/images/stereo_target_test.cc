@@ -136,8 +136,8 @@ sensors:
            focal_px: 120, baseline_m: 0.065, sigma_px: 50}
 estimators: {ekf: {type: ekf}}
 )");
-  // The sensor entry has a sigma of 50 px. Unless the variances of the measurements are used,
-  // disparity hardly changes the depth.
+  // The sensor entry has a sigma of 50 px. If the variances of the measurements were ignored,
+  // disparity would hardly change the depth.
   const auto rmse_mm = [&](const char* estimate) {
     const Outcome outcome =
         Call({"run", "run.yaml", "-o", "run", "--force", "--set",
@@ -155,7 +155,8 @@ estimators: {ekf: {type: ekf}}
 
 TEST_F(StereoTarget, HiddenBlackAndFrozenImagesGiveNothingFalse) {
   MakePair();
-  // Three images are black. One image is dimmer, which has no effect. One image is a repetition.
+  // Three images are black. One image is dimmer, which has no effect. One image repeats the
+  // previous image.
   for (const int k : {5, 6, 7}) Change(k, [](cv::Mat& image) { image.setTo(0); });
   Change(12, [](cv::Mat& image) { image = 0.5 * image + 20; });
   for (const char* side : {"left", "right"}) {
@@ -193,8 +194,8 @@ TEST_F(StereoTarget, WithoutTextureThereIsNoDisparity) {
 
 TEST_F(StereoTarget, AMatchThatRepeatsIsNone) {
   MakePair();
-  // Vertical stripes with a period of 12 px match at every multiple of 12 px of disparity. Their
-  // rows differ.
+  // Vertical stripes with a period of 12 px match at every multiple of 12 px of disparity. The rows
+  // of the stripes differ.
   for (int k = 0; k < 21; ++k) {
     Change(k, [&](cv::Mat& image) {
       for (int y = 0; y < image.rows; ++y) {
@@ -209,7 +210,8 @@ TEST_F(StereoTarget, AMatchThatRepeatsIsNone) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_TRUE(Found("disparity").empty());
   EXPECT_EQ(Found("inverse_scale").size(), 21u);
-  // The repeated match is the only reason: without the check there are disparities.
+  // The repeated match is the only reason why disparities are missing. Without the check,
+  // disparities are found.
   ASSERT_EQ(Measure({"--set", "source.disparity.min_distinct=0"}).code, 0);
   EXPECT_FALSE(Found("disparity").empty());
 }
@@ -227,8 +229,8 @@ source: {type: stereo_target, left: 'pair/images/left/*.png', rate_hz: 20, boxes
 }
 
 TEST_F(StereoTarget, APlaneThatTiltsKeepsItsDepth) {
-  // Draws a textured plate 2 m ahead with its homography. The plate is tilted and moved back step
-  // by step.
+  // Draws a textured plate 2 m ahead by means of a homography. The plate is tilted and moved back
+  // step by step.
   const cv::Matx33d k(200, 0, 160, 0, 200, 120, 0, 0, 1);
   cv::Mat texture(240, 320, CV_8U);
   cv::RNG random(3);
@@ -269,8 +271,8 @@ source: {type: stereo_target, left: plate, rate_hz: 20, target: [110, 70, 101, 1
 
 TEST_F(StereoTarget, WhatCoversTheTargetIsNotIt) {
   MakePair();
-  // A plate slides over the target from the left and stays over it until image 12. Later images are
-  // unchanged.
+  // A plate slides over the target from the left and covers the target until image 12. Later images
+  // are unchanged.
   cv::Mat plate(180, 240, CV_8U);
   cv::RNG random(5);
   random.fill(plate, cv::RNG::UNIFORM, 0, 255);
@@ -307,7 +309,7 @@ std::vector<double> DrawSwing(const std::filesystem::path& folder, int count) {
   std::vector<double> sizes;
   for (int i = 0; i < count; ++i) {
     constexpr int kParts = 24;
-    constexpr double kReach = 32.0, kSpeed = 16.0;  // in px, and in px per image
+    constexpr double kReach = 32.0, kSpeed = 16.0;  // amplitude in px, and speed in px per image
     cv::Mat mean(wall.size(), CV_32F, cv::Scalar(0.0));
     for (int part = 0; part < kParts; ++part) {
       const double t = i + 0.8 * ((part + 0.5) / kParts - 0.5);
@@ -336,18 +338,18 @@ source: {type: stereo_target, left: swing, rate_hz: 20, target: [101, 71, 38, 38
   const Outcome outcome = Measure();
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Values scale = Found("inverse_scale");
-  EXPECT_GE(scale.size(), 38u);  // 10 without a blurred template
+  EXPECT_GE(scale.size(), 38u);  // only 10 if the template were not blurred
   for (const auto& [frame, value] : scale) {
     EXPECT_NEAR(value * sizes[static_cast<std::size_t>(frame)], 1.0, 0.02) << frame;
   }
-  // Measurements to which blur gives a large uncertainty can be omitted.
+  // Measurements that have a large uncertainty because of blur can be omitted.
   ASSERT_EQ(Measure({"--set", "source.max_relative_sigma=0.01"}).code, 0);
   EXPECT_LT(Found("inverse_scale").size(), scale.size());
 }
 
 TEST_F(StereoTarget, ATargetThatIsGoneIsNotFoundElsewhere) {
   DrawSwing(folder_ / "swing", 2);
-  // The next 54 images have other content. In each of them some place is the best match.
+  // The next 54 images have other content. In each of these images, some place is the best match.
   cv::RNG random(2);
   for (int k = 2; k < 56; ++k) {
     cv::Mat image(180, 240, CV_8U);
@@ -414,20 +416,20 @@ TEST_F(StereoTarget, BadInputIsNamed) {
   expect({"--set", "source.target=[75, 45, 4, 90]"}, 78, "less than 8 px");
   expect({"--set", "source.target=[0, 0, 0, 0]"}, 78, "less than 8 px");
   expect({"--set", "source.target=[200, 45, 90, 90]"}, 65, "the target is not inside this image");
-  expect({"--set", "source.stereo=pair.yaml"}, 65, "not a calibration");
+  expect({"--set", "source.stereo=pair.yaml"}, 65, "cannot read this calibration");
   expect({"--set", "source.warp=homography"}, 78, "camera.fx");
   expect({"--set", "source.start_frame=21"}, 78,
-         "source.start_frame: 21, but there are 21 images, counted from 0");
+         "source.start_frame: image 21 does not exist; the source has 21 images");
   expect({"--set", "camera={width: 320, height: 180}"}, 65,
-         "000000.png: 240x180 px, but the camera of --set");
+         "000000.png: the image has 240x180 px, but the camera of --set");
   Write("times.csv", "0,0\n1,1\n2,2\n4,4\n");
-  expect({"--set", "source.timestamps=times.csv"}, 65, "times.csv:4: no time for image 3");
+  expect({"--set", "source.timestamps=times.csv"}, 65, "times.csv:4: there is no time for image 3");
   Write("boxes.csv", "frame,x,y,width,height\n0,75,45,2,90\n");
   expect({"--set", "source.boxes=boxes.csv"}, 65, "boxes.csv:2:");
   Write("boxes.csv", "0,165,45,75,45,75,134,165,134\n");
   expect({"--set", "source.boxes=boxes.csv"}, 65, "not in order");
   Write("boxes.csv", "frame,x,y,width,height\n");
-  expect({"--set", "source.boxes=boxes.csv"}, 65, "no rows");
+  expect({"--set", "source.boxes=boxes.csv"}, 65, "contains no rows");
   const auto calibration = [](const std::string& r) {
     const std::string m = "!!opencv-matrix\n  rows: 3\n  cols: 3\n  dt: d\n  data: ";
     const std::string k = m + "[120, 0, 120, 0, 120, 90, 0, 0, 1]\n";
@@ -442,11 +444,11 @@ TEST_F(StereoTarget, BadInputIsNamed) {
   Write("truth.csv", "depth\n1\n");
   expect({"--set", "source.truth=truth.csv"}, 65, "t_s,NAME");
   std::filesystem::remove(Image("right", 20));
-  expect({}, 78, "20 images, but 'left' has 21");
+  expect({}, 78, "'right' has 20 images, but 'left' has 21");
   std::filesystem::remove(Image("left", 20));
   cv::Mat small(90, 120, CV_8U, cv::Scalar(9));
   ASSERT_TRUE(cv::imwrite(Image("right", 10), small));
-  expect({"--set", "source.rate_hz=20"}, 65, "000010.png: 120x90 px");
+  expect({"--set", "source.rate_hz=20"}, 65, "000010.png: the image has 120x90 px");
 }
 
 TEST_F(StereoTarget, Example28IsBetterThanItsSimulatedNoise) {
@@ -480,13 +482,13 @@ TEST_F(StereoTarget, Example28IsBetterThanItsSimulatedNoise) {
   }
 }
 
-/// 13 real stereo pairs of a chessboard. Its corners determine the true depth.
+/// Data of 13 real stereo pairs of a chessboard, whose corners determine the true depth.
 TEST_F(StereoTarget, ABoardOfAChessIsAsFarAsItsCornersSay) {
   const char* const data = std::getenv("ALIDADE_DATA");
   const std::filesystem::path boards =
       std::filesystem::path(data == nullptr ? "" : data) / "stereo-chessboard";
   if (data == nullptr || !std::filesystem::exists(boards / "left01.jpg")) {
-    GTEST_SKIP() << "ALIDADE_DATA has no stereo-chessboard";
+    GTEST_SKIP() << "ALIDADE_DATA does not contain stereo-chessboard";
   }
   const cv::Size pattern(9, 6);
   constexpr float kSquare = 0.025F;
@@ -575,8 +577,8 @@ TEST_F(StereoTarget, ABoardOfAChessIsAsFarAsItsCornersSay) {
   RecordProperty("median_by_scale", std::to_string(median(by_scale)));
 }
 
-/// Videos of faces with labelled boxes [Kalal2010]. All use the same config, which contains only
-/// the first box.
+/// Videos of faces with labelled boxes [Kalal2010]. All videos use the same config, which contains
+/// only the first box.
 class StereoTargetOfFaces : public StereoTarget {
  protected:
   /// Checks the median relative error of the target's size. At least `fewest` images must have a
@@ -585,7 +587,7 @@ class StereoTargetOfFaces : public StereoTarget {
     const char* const data = std::getenv("ALIDADE_DATA");
     const auto video = std::filesystem::path(data == nullptr ? "" : data) / "tld-boxes" / name;
     if (data == nullptr || !std::filesystem::exists(video)) {
-      GTEST_SKIP() << "ALIDADE_DATA has no tld-boxes";
+      GTEST_SKIP() << "ALIDADE_DATA does not contain tld-boxes";
     }
     std::vector<cv::Rect2d> boxes;
     std::istringstream rows(testing::ReadText(video.parent_path() / "gt.txt"));

@@ -5,14 +5,14 @@
 #
 # Configures tests/install/echo with the function alidade_add_plugin of this tree. By default the
 # plugin must be compiled with -O2. If the build type or the flags set another optimisation level,
-# that level must be used.
+# the plugin must be compiled with that level.
 set -euo pipefail
 cmake=$1 compiler=$2
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# Writes a package configuration that takes the place of the installed one.
+# Writes a package configuration that replaces the installed one.
 mkdir "$work/package"
 cat >"$work/package/alidadeConfig.cmake" <<END
 add_library(alidade::model INTERFACE IMPORTED)

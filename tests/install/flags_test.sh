@@ -33,7 +33,7 @@ else
   echo "$flag: compiled and run"
 fi
 
-# Finds out how the flags change the alignment of Eigen.
+# Determines how the flags change the alignment of Eigen.
 macros=$("$compiler" "${flags[@]}" -dM -E -x c++ - </dev/null)
 remedy=
 grep -q '__SANITIZE_ADDRESS__' <<<"$macros" && remedy=-DEIGEN_MALLOC_ALREADY_ALIGNED=1
@@ -46,7 +46,7 @@ fi
 if [[ -z $remedy ]] || ! grep -qF -- "link the CMake target alidade::estimation" "$work/errors" ||
   ! grep -qF -- "$remedy" "$work/errors"; then
   cat "$work/errors" >&2
-  echo "error: $flag is not refused in the words expected, with the remedy '$remedy'" >&2
+  echo "error: $flag is refused, but the message lacks the expected words or the remedy '$remedy'" >&2
   exit 1
 fi
 echo "$flag: refused without the options of alidade::estimation"

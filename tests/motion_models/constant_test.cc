@@ -31,9 +31,9 @@ TEST(Constant, WalksWithTheRootOfTime) {
   EXPECT_EQ(walk->blocks()[0].elements, (std::vector<std::string>{"0", "1", "2"}));
   const Blocks x{{1, 2, 3}};
   EXPECT_EQ(StepWithJacobians(walk, x, nullptr, nullptr, 0.25).next, x)
-      << "no noise given is zero noise";
+      << "without a noise argument the noise is zero";
   ExpectTrueJacobians(walk, x, nullptr, {0.1, -0.2, 0.3}, 0.25);
-  // The variance is 0.2^2 0.25 = 0.01.
+  // The variance is 0.2^2 * 0.25 = 0.01.
   ExpectSame(Covariance(walk, x, 0.25), {0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01}, 1e-15);
 }
 

@@ -69,13 +69,15 @@ TEST(OdometryPose, FollowsTheVehicle) {
   ExpectPose(
       testing::StepWithJacobians(motion, Camera(0, 0, 0), all_but_straight, nullptr, 1.0).next,
       Camera(400 * std::sin(0.005), 800 * half * half, 0.005));
-  // The vehicle starts at another heading. The noise alone moves it, without a control input.
+  // The vehicle starts at another heading. The control input is zero, and only the noise moves the
+  // vehicle.
   const double none[6] = {};
   ExpectPose(testing::StepWithJacobians(motion, Camera(5, 6, kPi / 2), none, bend, 1.0).next,
              Camera(1, 10, kPi));
 }
 
-// Model parameter states have the same effect as the same values in the config and in the input.
+// Model parameter states must have the same effect as the same values in the config and in the
+// input.
 TEST(OdometryPose, MountingAndSpeedMayBeInTheState) {
   const double input[6] = {2, 0.1, -0.3, 0.2, 0.5, -0.9};
   const double wrong[6] = {2 / 1.25, 0.1 / 1.25, -0.3 / 1.25, 0.2, 0.5, -0.9};
@@ -83,7 +85,7 @@ TEST(OdometryPose, MountingAndSpeedMayBeInTheState) {
                                                   Camera(5, 6, 1), input, nullptr, 0.7)
                            .next;
 
-  MapHost::Values not_mounted = kMounted;  // 0.5 m lower and rotated by 0.1 rad about y
+  MapHost::Values not_mounted = kMounted;  // mounted 0.5 m lower and rotated by 0.1 rad
   not_mounted["vehicle_from_cam.position"] = {1, 0, 1};
   const double tilt[4] = {std::cos(0.05), 0, std::sin(0.05), 0},
                back[4] = {tilt[0], 0, -tilt[2], 0};
@@ -121,7 +123,7 @@ TEST(OdometryPose, NoiseIsPerAxis) {
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(q[7 * i], sigma[i] * sigma[i], 1e-17);
 }
 
-// The velocity error is constant over the gap, or it is white noise. On a straight path, processing
+// The velocity error is either constant over the gap or white noise. On a straight path, processing
 // the gap in two parts changes only the lateral effect of rotation.
 TEST(OdometryPose, NoiseOfEitherKindIsThatOfTheWholeGap) {
   MapHost::Values values = kMounted;

@@ -24,8 +24,8 @@ const MapHost::Values kNoise{{"noise.linear_acceleration", {0.6}},
                              {"noise.angular_acceleration", {0.1, 0.2, 0.3}}};
 
 TEST(QuaternionPose, MovesAndTurnsByWorkedNumbers) {
-  // The body turns by half a turn about z in 1 s.
-  // a = (0, 2, 0) m/s^2: v' = (1, 2, 0), r' = (1, 2, 3)
+  // The body rotates by half a turn about z in 1 s. With a = (0, 2, 0) m/s^2, v' = (1, 2, 0) and r'
+  // = (1, 2, 3).
   const double pi = 3.14159265358979323846;
   const Blocks x{{0, 0, 3}, {1, 0, 0, 0}, {1, 0, 0}, {0, 0, pi / 2}};
   const double w[6] = {0, 2, 0, 0, 0, pi / 2};
@@ -65,11 +65,11 @@ TEST(QuaternionPose, NoiseIsOneNumberOrOneForEachAxis) {
     static_cast<void>(testing::MakeInstance(&EmplaceMotion<QuaternionPose>, host));
     ASSERT_EQ(host.failures().size(), 1u) << bad.size();
     EXPECT_EQ(host.failures()[0],
-              "noise.linear_acceleration: needs one number, or one for each axis");
+              "noise.linear_acceleration: needs one number, or one number for each axis");
   }
 }
 
-/// The sensor measures the block itself: z = x (+) n, n ~ N(0, 0.02^2 I).
+/// Measures the block itself: z = x (+) n, n ~ N(0, 0.02^2 I).
 template <class G>
 struct Itself : Sensor<G, G> {
   static constexpr std::array kRoles{Quantity{"x"}};
@@ -85,8 +85,8 @@ struct Itself : Sensor<G, G> {
   }
 };
 
-/// Returns a problem with one body, which starts at rest. Sensors measure its position and its
-/// orientation.
+/// Returns a problem with one body, which starts at rest. Sensors measure the position and the
+/// orientation of the body.
 Problem MeasuredPose(const SharedMotion& model) {
   Problem problem;
   MotionBinding binding{"body", model, {}};
@@ -169,8 +169,8 @@ TEST(QuaternionPose, HoldsItsNoiseToFirstOrder) {
 }
 
 TEST(ContinuousQuaternionPose, MovesAndTurnsByWorkedNumbers) {
-  // The angular velocity and w each rotate the body by a quarter turn about z in 1 s; together this
-  // is half a turn.
+  // In 1 s the angular velocity rotates the body by a quarter turn about z, and w rotates it by
+  // another quarter turn.
   const double pi = 3.14159265358979323846;
   const Blocks x{{0, 0, 3}, {1, 0, 0, 0}, {1, 0, 0}, {0, 0, pi / 2}};
   const double w[12] = {0, 2, 0, 0, 0, pi / 2, 0, 0, 4, 0, 1, 0};
@@ -198,8 +198,8 @@ TEST(ContinuousQuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
   testing::ExpectTrueJacobians(motion, slow, nullptr, none, 0.3);
 }
 
-// Each axis of (r, v) has noise of covariance sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt]. Without rotation
-// (q, omega) has the same.
+// Each axis of (r, v) has noise of covariance sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt]. Without rotation,
+// the covariance of (q, omega) has the same form.
 TEST(ContinuousQuaternionPose, NoiseAddsUp) {
   const auto motion = AbiMotion<ContinuousQuaternionPose>(kNoise);
   EXPECT_FALSE(motion->discrete_noise());

@@ -16,8 +16,8 @@ SharedSensor DepthSensor(const Camera& camera) {
 }
 
 TEST(DepthFeature, PredictsWorkedNumbers) {
-  // The camera at (1, 0, 0) m looks along z. The point is at (0, 0.4, 2) m, so its depth is 2 m.
-  // sigma_d = 0.01 + 0.003 2^2 = 0.022 m
+  // The camera at (1, 0, 0) m looks along z. The point is at (0, 0.4, 2) m, so its depth is 2 m and
+  // sigma_d = 0.01 m + 0.003 * 2^2 m = 0.022 m.
   ForEachRepresentation([](auto representation) {
     using Representation = decltype(representation);
     const Blocks roles = Blocks{{1, 0, 0}, {1, 0, 0, 0}} +

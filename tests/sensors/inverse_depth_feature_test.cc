@@ -29,8 +29,9 @@ Blocks SeenAt(const Camera& camera, const std::vector<double>& pixel) {
 }
 
 TEST(InverseDepthFeature, PredictsWorkedNumbers) {
-  // The camera at (1, 0, 0) m looks along z; the point is at (0, 0.4, 2) m: h = (-1, 0.4, 2) m
-  // u = 320 + 525 (-1) / 2 = 57.5, v = 240 + 525 0.4 / 2 = 345 px
+  // The camera at (1, 0, 0) m looks along z, and the point is at (0, 0.4, 2) m, so h = (-1, 0.4, 2)
+  // m.
+  // u = 320 + 525 (-1) / 2 = 57.5 px, v = 240 + 525 * 0.4 / 2 = 345 px
   ForEachRepresentation([](auto representation) {
     using Representation = decltype(representation);
     const Blocks landmark = LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});

@@ -47,7 +47,7 @@ TEST(Pseudorange, IsNotDefinedAtTheTransmitter) {
   EXPECT_EQ(z, kPoison);
   EXPECT_THROW(static_cast<void>(sensor->Predict(Pointers(kPseudorangeRoles).data(), &z)),
                ContractViolation)
-      << "where is the transmitter?";
+      << "the position of the transmitter is missing";
 }
 
 TEST(Pseudorange, OwnsTheClock) {

@@ -22,7 +22,7 @@ using testing::NumericSensorJacobian;
 using testing::Pointers;
 using testing::SensorJacobian;
 
-// lambda = 3 1/m and Z = 0.5 m, so s = 1.5.
+// lambda = 3 /m and Z = 0.5 m, so s = 1.5.
 const MapHost::Values kScale{{"noise_model", {0}}, {"template_px", {300}}, {"sigma_px", {1}}};
 const Blocks kScaleRoles{{0.5}, {3.0}};
 
@@ -35,7 +35,7 @@ TEST(Scale2d, PredictsWorkedNumbers) {
   EXPECT_EQ(SensorJacobian(scale, kScaleRoles), (std::vector<double>{3.0, 0.5}));
   ExpectSame(SensorJacobian(scale, kScaleRoles), NumericSensorJacobian(scale, kScaleRoles),
              kNumeric);
-  // The sigma is (2 1 / 300) 1.5^3 = 0.0225.
+  // The sigma is (2 * 1 / 300) * 1.5^3 = 0.0225.
   ASSERT_EQ(scale->SqrtNoise(roles.data(), &s, &sigma), Status::kOk);
   EXPECT_DOUBLE_EQ(sigma, 0.0225);
 }

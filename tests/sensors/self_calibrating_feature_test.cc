@@ -22,7 +22,8 @@ SharedSensor Made() {
 const Blocks kRadial{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}, {500, -0.3, 0.2}, {-2.6, 1.1, 3.5}};
 const std::vector<double> kRadtan{500, 320, 240, -0.3, 0.2, 0.05, 0.01, -0.02};
 
-// h = (0.3, -0.4, 1) m: q = 0.25, s = 1 - 0.3 0.25 + 0.2 0.0625 = 0.9375, f s = 468.75 px
+// With h = (0.3, -0.4, 1) m, q = 0.25, s = 1 - 0.3 * 0.25 + 0.2 * 0.0625 = 0.9375 and
+// f s = 468.75 px.
 TEST(SelfCalibratingFeature, PredictsWorkedNumbers) {
   const Blocks roles{{1, 0, 0}, {1, 0, 0, 0}, {500, -0.3, 0.2}, {1.3, -0.4, 1}};
   const std::vector<double> z = Predicted(Made<RadialLens>(), roles);
@@ -96,7 +97,7 @@ TEST(SelfCalibratingFeature, SeesPointsBehindItWhereItsDomainIsProjective) {
   const SharedSensor sensor =
       MakeSensor(SelfCalibratingFeature<RadialLens>(0.5, true), "self_calibrating_feature");
   // h = (-0.3, 0.4, -1) m is the opposite of h in PredictsWorkedNumbers. Both points lie on one
-  // line through the camera, so x = h / hz is the same.
+  // line through the camera, so x = h / hz is the same for both.
   Blocks roles{{1, 0, 0}, {1, 0, 0, 0}, {500, -0.3, 0.2}, {0.7, 0.4, -1}};
   const std::vector<double> z = Predicted(sensor, roles);
   EXPECT_NEAR(z[0], 140.625, 1e-12);

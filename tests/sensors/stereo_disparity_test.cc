@@ -21,7 +21,7 @@ using testing::MapHost;
 using testing::NumericSensorJacobian;
 using testing::SensorJacobian;
 
-// f = 400 px, B = 0.065 m and Z = 0.5 m, so d = 400 0.065 / 0.5 = 52 px.
+// f = 400 px, B = 0.065 m and Z = 0.5 m, so d = 400 * 0.065 / 0.5 = 52 px.
 const MapHost::Values kStereo{
     {"focal_px", {400}}, {"baseline_m", {0.065}}, {"sigma_px", {1.5}}, {"min_range_m", {0.2}}};
 

@@ -18,8 +18,7 @@ SharedSensor MadeStereo() {
 
 TEST(StereoFeature, PredictsWorkedNumbers) {
   // The left camera at (1, 0, 0) m looks along z. The point is at (0, 0.4, 2) m. The left pixel is
-  // that of a single camera.
-  // d = 525 0.1 / 2 = 26.25 px: u_right = 57.5 - 26.25
+  // that of a single camera. d = 525 * 0.1 / 2 = 26.25 px, so u_right = 57.5 px - 26.25 px.
   ForEachRepresentation([](auto representation) {
     using Representation = decltype(representation);
     const Blocks roles = Blocks{{1, 0, 0}, {1, 0, 0, 0}} +
@@ -42,7 +41,7 @@ TEST(StereoFeature, MayHaveAnotherNoiseInUThanInV) {
     const Blocks roles = kPose + LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
     std::vector<double> z(4), l(16, kPoison);
     ASSERT_EQ(sensor->SqrtNoise(Pointers(roles).data(), z.data(), l.data()), Status::kOk);
-    const double diagonal[4] = {0.5, 2.0, 0.5, 2.0};  // in the order u, v, u_right, v_right
+    const double diagonal[4] = {0.5, 2.0, 0.5, 2.0};  // the order is u, v, u_right, v_right
     for (std::size_t i = 0; i < 16; ++i) EXPECT_EQ(l[i], i % 5 == 0 ? diagonal[i / 5] : 0.0);
   });
 }
@@ -82,7 +81,7 @@ TEST(StereoFeature, InitialisesWithoutAPrior) {
     EXPECT_EQ(sensor->inverse().prior_size, 0);
     ExpectTrueInverse(sensor,
                       Blocks{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}, {411, 87.5, 390, 87.5}});
-    // a disparity of 0 px
+    // The disparity is 0 px.
     const std::vector<double> far{411, 87.5, 411, 87.5};
     const std::vector<double> position{0, 0, 0}, orientation{1, 0, 0, 0};
     std::vector<const double*> roles(sensor->roles().size());

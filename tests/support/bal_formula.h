@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-/// Computation of the cost of a BAL or Bundler file from its text, by the definition of the
-/// formats:
+/// Computes the cost of a BAL or Bundler file from its text, by the definition of the formats:
 ///
 ///   P = R X + t,   p = -P / P_z,   p' = f (1 + k1 |p|^2 + k2 |p|^4) p
 ///
@@ -17,14 +16,14 @@
 namespace alidade::testing {
 
 struct FormulaCost {
-  double squares = 0.0;  ///< sum of |p' - z|^2 over all observations z, px^2
+  double squares = 0.0;  ///< sum of |p' - z|^2 over all observations z, in px^2
   int observations = 0;
   int behind = 0;  ///< number of observations with P_z > 0
   double Rms() const { return std::sqrt(squares / observations); }
 };
 
 struct FormulaCamera {
-  std::array<double, 9> r{};  ///< row-major
+  std::array<double, 9> r{};  ///< rotation matrix, row-major
   std::array<double, 3> t{}, lens{};
 };
 

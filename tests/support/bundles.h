@@ -49,9 +49,9 @@ inline BundleFile TrueBundle(int cameras = 6, int points = 40) {
   return file;
 }
 
-/// Returns a problem of cameras side by side. One point in four is behind the cameras, the others
-/// are in front. The noise is about half a pixel, and is the same in every run. The sensor is the
-/// projective camera of BAL.
+/// Returns a problem of cameras side by side. One point in four is behind the cameras; the other
+/// points are in front. The noise is about half a pixel, and is the same in every run. The sensor
+/// is the projective camera of BAL.
 inline BundleFile BundleOnBothSides(int cameras = 8, int points = 60) {
   BundleFile file;
   BundleProblem& problem = file.problem;

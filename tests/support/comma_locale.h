@@ -11,8 +11,8 @@
 
 namespace alidade::testing {
 
-/// Locale in which C and C++ write `1,5` for 1.5. It is active during the lifetime of the object.
-/// The object builds the locale with localedef; no such locale has to be installed.
+/// Locale in which C and C++ write `1,5` for 1.5. The locale is active during the lifetime of the
+/// object. The object builds the locale with localedef, so no such locale has to be installed.
 class CommaLocale {
  public:
   CommaLocale() : before_(std::setlocale(LC_ALL, nullptr)) {

@@ -8,7 +8,7 @@
 
 #include "alidade/config/config.h"
 
-/// Functions for tests that make configs from text.
+/// Functions for tests that create configs from text.
 namespace alidade::testing {
 
 inline Config Read(std::string_view text) { return Config::FromText(text, "f.yaml"); }

@@ -85,7 +85,7 @@ struct Inertial : Motion<12, Vec<3>, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
       Quantity{"rate_bias", "rad/s", "", "x,y,z"}};
   using Input = Vec<6>;
   static constexpr Quantity kInput{"readings", "", "", "fx,fy,fz,wx,wy,wz"};
-  static constexpr double kDensities[4] = {0.02, 0.002, 0.001, 0.0001};  // f, omega, biases
+  static constexpr double kDensities[4] = {0.02, 0.002, 0.001, 0.0001};  // f, omega, b_f, b_omega
   template <class T>
   void Step(const T* p, const T* v, const T* q, const T* b_f, const T* b_omega, const T* u,
             const T* w, double dt_s, T* p1, T* v1, T* q1, T* b_f1, T* b_omega1) const {

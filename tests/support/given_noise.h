@@ -8,7 +8,7 @@
 #include "alidade/model/plugin.h"
 #include "alidade/plugin/plugin_models.h"
 
-/// Models in this process with a given noise in place of their own. For tests.
+/// Models in this process whose noise is replaced by a given noise. For tests.
 namespace alidade::testing {
 
 /// Returns the sensor with noise L = `root`, m x m row-major: R = L L'.

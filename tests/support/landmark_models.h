@@ -48,7 +48,7 @@ struct Observation {
   std::int64_t id;
   std::vector<double> z;
 };
-/// Returns a frame of stream 0 with the given landmarks.
+/// Returns a frame of stream 0 with the given observations.
 inline Frame FrameOf(double t_s, const std::vector<Observation>& observations) {
   Frame frame;
   frame.timestamp = TimestampFromSeconds(t_s);

@@ -77,8 +77,8 @@ inline std::vector<double> Predicted(const SharedSensor& sensor, const Blocks& r
 
 /// Compares the Jacobians of Predict with numeric Jacobians.
 inline void ExpectTrueJacobians(const SharedSensor& sensor, const Blocks& roles) {
-  // The numeric error is h^4 times fifth derivatives of pixels. These are at most 1e4 times the
-  // Jacobians.
+  // The numeric error is h^4 times fifth derivatives of pixels. These derivatives are at most 1e4
+  // times the Jacobians.
   ExpectSame(SensorJacobian(sensor, roles), NumericSensorJacobian(sensor, roles), 10 * kNumeric);
 }
 

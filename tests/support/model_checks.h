@@ -11,7 +11,7 @@
 #include "alidade/plugin/plugin_models.h"
 #include "alidade/testing/jacobians.h"
 
-/// Checks that several tests of models use. They call the models through the plugin ABI.
+/// Checks that several tests of models use. The checks call the models through the plugin ABI.
 namespace alidade::testing {
 
 inline constexpr double kPoison = 1e302;
@@ -70,7 +70,7 @@ inline NoisyStep StepWithNoise(const SharedMotion& motion, const Blocks& x, cons
 }
 
 /// Returns the relative difference between the noise of two steps and that of one step over both
-/// durations. It is computed for the noise kind that the model declares.
+/// durations. The difference is computed for the noise kind that the model declares.
 inline double DefectOfParts(const SharedMotion& motion, const Blocks& x, const double* u,
                             double first_s, double second_s) {
   const double both_s = first_s + second_s;

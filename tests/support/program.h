@@ -102,7 +102,7 @@ class ProgramTest : public ::testing::Test {
   bool Exists(const std::string& name) const { return fs::exists(folder_ / name); }
 
   /// Starts `alidade ARGUMENTS...`, with the output redirected to files. If `before_` is not empty,
-  /// a shell runs this command first, for example to set limits or to redirect.
+  /// a shell runs this command first, for example to set limits or to redirect streams.
   pid_t Start(Arguments arguments, const std::string& out = "stdout") const {
     arguments.insert(arguments.begin(), ALIDADE_BINARY_DIR "/bin/alidade");
     if (!before_.empty()) {

@@ -46,7 +46,7 @@ inline std::vector<std::string> Cells(const std::string& line) {
   return cells;
 }
 
-/// Source with a target at the depth 0.3 + 0.1 sin(0.4 * 2 pi t). It is measured with a small
+/// Source with a target at the depth 0.3 + 0.1 sin(0.4 * 2 pi t). The measurements have a small
 /// deterministic error. Only every other frame contains the disparity.
 class SwingingTarget : public Source {
  public:
@@ -120,8 +120,8 @@ inline void Record(const Recorder::Options& options, int frames = 60) {
   recorder.Finish(result);
 }
 
-/// Returns the exit code of the error that `call` throws, or 0 if it throws none. `text` receives
-/// the message of the error.
+/// Returns the exit code of the error that `call` throws, or 0 if `call` throws no error. `text`
+/// receives the message of the error.
 template <class Call>
 int CodeOf(const Call& call, std::string* text = nullptr) {
   try {
@@ -133,8 +133,8 @@ int CodeOf(const Call& call, std::string* text = nullptr) {
   return 0;
 }
 
-/// Runs `call` in a child process. Returns the exit code of this process, or 128 + n if signal n
-/// ended it.
+/// Runs `call` in a child process. Returns the exit code of the child process, or 128 + n if signal
+/// n ended the child process.
 template <class Call>
 int InChild(const Call& call) {
   const pid_t child = ::fork();

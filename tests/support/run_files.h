@@ -7,10 +7,10 @@
 #include "alidade/replay/replay.h"
 #include "support/program.h"
 
-/// Comparison of run folders.
+/// Functions that compare run folders.
 namespace alidade::testing {
 
-/// Returns the content of each file without wall-clock times, by the name of the file.
+/// Returns the content of each file without wall-clock times, keyed by file name.
 inline std::map<std::string, std::string> RunFiles(const fs::path& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
@@ -21,8 +21,8 @@ inline std::map<std::string, std::string> RunFiles(const fs::path& folder) {
   return files;
 }
 
-/// Expects both folders to have the same files with the same content. A failure names the file that
-/// differs.
+/// Expects both folders to contain the same files with the same content. A failure names the file
+/// that differs.
 inline void ExpectSameFiles(const fs::path& folder, const fs::path& expected) {
   const auto files = RunFiles(folder), others = RunFiles(expected);
   EXPECT_GT(others.size(), 4u);

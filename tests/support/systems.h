@@ -37,7 +37,7 @@ struct Linear : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-// Models that most tests use. They are compiled only once, in systems.cc.
+// Models that most tests use, compiled only once in systems.cc.
 SharedSensor LinearSensor(double gain, double sigma);
 SharedMotion ConstantMotion(int size, double random_walk = 0.0);
 /// Returns a constant-velocity model on one axis, with discrete noise.
@@ -51,7 +51,7 @@ struct GivenPrior {
 /// Adds a state entry whose scalar blocks have the given priors.
 void AddMotion(Problem& problem, const std::string& name, const SharedMotion& model,
                const std::vector<GivenPrior>& priors);
-/// Adds a sensor. It reads the stream that has the same name.
+/// Adds a sensor that reads the stream of the same name.
 void AddSensor(Problem& problem, const std::string& name, const SharedSensor& model,
                const std::vector<std::string>& blocks);
 
@@ -67,13 +67,13 @@ Problem MovingPoint(double acceleration = 1.0);
 /// Returns the problem of MovingPoint() with an acceleration that is constant between two updates.
 Problem HeldPoint(double acceleration = 1.0);
 
-/// Returns the problem of the depth filter. Its blocks are `target.depth`, `target.depth_rate` and
-/// `template.inverse_distance`. Its sensors are `disparity` (BF = 26 px m, sigma 1 px) and
+/// Returns the problem of the depth filter. The blocks are `target.depth`, `target.depth_rate` and
+/// `template.inverse_distance`. The sensors are `disparity` (BF = 26 px m, sigma 1 px) and
 /// `inverse_scale` (template 300 px, sigma 1 px).
 Problem DepthFilter();
 
-/// Returns the problem with a new status of block `name`. If `name` is empty, every block gets the
-/// status.
+/// Returns the problem with a new status of block `name`. If `name` is empty, every block receives
+/// this status.
 Problem WithStatus(Problem problem, const std::string& name, BlockStatus status);
 
 /// Sensor z = sqrt(5 - x). z and its Jacobian are NaN for x > 5.

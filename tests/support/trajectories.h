@@ -9,8 +9,8 @@
 /// Generated trajectories, for tests of the evaluation of trajectories.
 namespace alidade::testing {
 
-/// Returns a trajectory on a curve in space, with a changing orientation. It has `poses` poses
-/// every 0.1 s, the first at 100 s.
+/// Returns a trajectory on a curve in space, with a changing orientation. It contains `poses`
+/// poses, one every 0.1 s, beginning at 100 s.
 inline Trajectory Curve(int poses) {
   Trajectory t;
   t.name = "curve.tum";
@@ -26,8 +26,8 @@ inline Trajectory Curve(int poses) {
   return t;
 }
 
-/// Returns a trajectory on a straight line along x, without rotation. It moves by `step_m` every
-/// 0.1 s.
+/// Returns a trajectory on a straight line along x, without rotation. The position moves by
+/// `step_m` every 0.1 s.
 inline Trajectory Line(int poses, double step_m) {
   Trajectory t = Curve(poses);
   for (int i = 0; i < poses; ++i) {

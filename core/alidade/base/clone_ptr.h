@@ -6,9 +6,9 @@
 
 namespace alidade {
 
-/// Owning pointer whose copy owns a copy of the T, made by T::Clone() if T has this function. A
-/// moved-from pointer may only be assigned to or destroyed. T may be incomplete, except when the
-/// constructor is called.
+/// Owning pointer. A copy of the pointer owns a copy of the T, created by T::Clone() if this
+/// function exists, otherwise by the copy constructor. A moved-from pointer may only be assigned to
+/// or destroyed. T must be complete only at calls of the constructor.
 template <class T>
 class ClonePtr {
  public:
@@ -32,7 +32,8 @@ class ClonePtr {
   const T* operator->() const { return value_.get(); }
 
  private:
-  // Has one owner; the deleter of a shared_ptr also works for an incomplete T.
+  // The value is never shared. Its pointer is a shared_ptr only because the deleter of a shared_ptr
+  // also works for an incomplete T.
   std::shared_ptr<T> value_;
   std::shared_ptr<T> (*copy_)(const T&);
 };

@@ -68,7 +68,7 @@ int EditDistance(std::string_view a, std::string_view b) {
 
 void FailContract(const char* expression, const char* file, int line) {
   throw ContractViolation(
-      ErrorLine(Place{file, line, 0}, {}, std::string("requires ") + expression));
+      ErrorLine(Place{file, line, 0}, {}, std::string("violated precondition: ") + expression));
 }
 
 }  // namespace alidade

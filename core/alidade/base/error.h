@@ -7,10 +7,10 @@
 
 namespace alidade {
 
-/// Exit code of a process that ends with an error. The values follow sysexits.h if a code applies.
+/// Exit code of the program. The values from 65 to 78 follow sysexits.h.
 enum class ExitCode : int {
   kOk = 0,
-  kFound = 1,          ///< the command succeeded and found a defect (check, compare)
+  kFound = 1,          ///< a command such as check or compare found a defect
   kUsage = 2,          ///< the command line is wrong
   kBadData = 65,       ///< an input file contains an error
   kInputMissing = 66,  ///< an input file cannot be opened
@@ -24,7 +24,7 @@ enum class ExitCode : int {
   kDiverged = 79,      ///< the filter diverged under `on_divergence: fail`
 };
 
-/// Position of a value in a file: line and column count from 1; 0 means unknown.
+/// Position of a value in a file. Lines and columns are numbered from 1; 0 means unknown.
 struct Place {
   std::string file;
   int line = 0;
@@ -45,29 +45,29 @@ class Error : public std::runtime_error {
   ExitCode code_;
 };
 
-/// Reason why the program ends: its exit code and its message.
+/// Failure that ends the program: exit code and message.
 struct Failure {
   ExitCode code = ExitCode::kInternal;
   std::string reason;
 };
 
-/// Returns the failure of the exception that is being handled: the code and text of an Error;
-/// kInternal for any other exception. Call it only in a catch block.
+/// Converts the exception that is being handled to a Failure. An Error provides its code and text.
+/// Any other exception has the code kInternal. Call this function only in a catch block.
 Failure CaughtFailure();
 
 /// Composes an error message in the form that Error describes. Empty parts are omitted.
 std::string ErrorLine(const Place& place, std::string_view key, std::string_view problem,
                       std::string_view expected = {}, std::string_view suggestion = {});
 
-/// Returns the candidate with the smallest edit distance to `word`, or "" if even this distance is
-/// too large for a suggestion.
+/// Returns the candidate with the smallest edit distance to `word`. Returns "" if no candidate is
+/// similar enough for a suggestion.
 template <class Range>
 std::string Nearest(std::string_view word, const Range& candidates);
 
 /// Returns the Damerau-Levenshtein distance. Swapping two adjacent letters counts as one edit.
 int EditDistance(std::string_view a, std::string_view b);
 
-/// Exception for a misuse of the API by the programmer; ALIDADE_EXPECTS throws it.
+/// Exception that ALIDADE_EXPECTS throws if a caller violates a precondition of the API.
 class ContractViolation : public std::logic_error {
   using std::logic_error::logic_error;
 };

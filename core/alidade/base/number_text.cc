@@ -46,7 +46,7 @@ std::string SecondsText(Timestamp timestamp) { return FixedText(Seconds(timestam
 
 void AppendSeconds(std::string& text, Timestamp timestamp) {
   constexpr std::uint64_t kSecond = 1'000'000'000;
-  // The magnitude is unsigned, because that of the smallest timestamp does not fit into Timestamp.
+  // The magnitude is unsigned, because the magnitude of INT64_MIN does not fit into a Timestamp.
   const std::uint64_t bits = static_cast<std::uint64_t>(timestamp);
   const std::uint64_t magnitude = timestamp < 0 ? 0 - bits : bits;
   if (timestamp < 0) text += '-';

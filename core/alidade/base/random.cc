@@ -39,7 +39,7 @@ double Random::Normal() {
     has_spare_ = false;
     return spare_;
   }
-  for (;;) {  // draws a point in the square until it lies in the unit disc (probability pi/4)
+  for (;;) {  // draws points in a square until one lies in the unit disc (probability pi/4)
     const double u = 2.0 * Uniform() - 1.0;
     const double v = 2.0 * Uniform() - 1.0;
     const double square = u * u + v * v;

@@ -6,11 +6,12 @@
 
 namespace alidade {
 
-/// Random number generator that produces the same numbers with every compiler and standard library:
-/// xoshiro256++. splitmix64 fills its 256-bit state from a seed and the index of a stream.
+/// Random number generator xoshiro256++. It produces the same numbers with every compiler and
+/// standard library. splitmix64 computes the initial 256-bit state from a seed and the index of a
+/// stream.
 ///
-/// Streams of one seed are independent. A source uses a separate stream for each noise, so that
-/// additional draws from one stream do not change another.
+/// The streams of one seed are independent. A source uses a separate stream for each kind of noise,
+/// so that additional draws from one stream do not change the numbers of another stream.
 ///
 /// Source       [Blackman2021] xoshiro256++; [Steele2014] splitmix64; [Marsaglia1964] polar method.
 class Random {

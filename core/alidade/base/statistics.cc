@@ -16,8 +16,8 @@ namespace {
 double GammaKernel(double a, double y) {
   constexpr double kSmall = 10.0;
   if (a <= kSmall) return std::pow(y, a) * std::exp(-y) / std::tgamma(a);
-  // Stirling's series of ln Gamma(a); the first omitted term is below 1e-15. The two large terms of
-  // the exponent are combined: a (ln(y / a) - mu).
+  // Stirling's series approximates ln Gamma(a); its first omitted term is below 1e-15. The two
+  // large terms of the exponent are combined to a (ln(y / a) - mu).
   const double mu = (y - a) / a, square = 1.0 / (a * a);
   const double log_ratio = mu < -0.5 ? std::log(y / a) : std::log1p(mu);
   constexpr double kSeries[] = {1.0 / 12.0,    -1.0 / 360.0, 1.0 / 1260.0,
@@ -36,8 +36,8 @@ struct Tails {
 };
 
 /// Returns the regularised incomplete gamma functions P(a, y) and Q(a, y), a = dof / 2, y = x / 2
-/// [Press2007, sec. 6.2]. The smaller one is computed by its series or its continued fraction, the
-/// larger one as its complement.
+/// [Press2007, sec. 6.2]. If y < a + 1, the function sums the series of P; otherwise, it evaluates
+/// the continued fraction of Q. The other value is the complement to 1.
 Tails ChiSquareTails(double x, double dof) {
   const double a = 0.5 * dof, y = 0.5 * x;
   constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
@@ -48,7 +48,7 @@ Tails ChiSquareTails(double x, double dof) {
     for (double k = a + 1.0; term > 0.1 * kEpsilon * sum; k += 1.0) sum += term *= y / k;
     return {kernel * sum, 1.0 - kernel * sum};
   }
-  // Lentz's method; its denominators are not zero, because y > a - 1.
+  // Lentz's method. The denominators are not zero, because y > a - 1.
   double b = y + 1.0 - a, c = std::numeric_limits<double>::max(), d = 1.0 / b, fraction = d;
   for (double k = 1.0, factor = 0.0; std::abs(factor - 1.0) > kEpsilon; k += 1.0) {
     b += 2.0;
@@ -66,7 +66,7 @@ double ChiSquareQuantile(double q, double dof) {
   ALIDADE_EXPECTS(q >= 0.0 && q <= 1.0 && dof > 0.0);
   if (q == 0.0) return 0.0;
   if (q == 1.0) return std::numeric_limits<double>::infinity();
-  // Bisection on the tail probability that does not round to 1.
+  // Uses the smaller tail probability, because the larger one may round to 1.
   const auto is_below = [q, dof](double x) {
     const Tails tails = ChiSquareTails(x, dof);
     return q <= 0.5 ? tails.below < q : tails.above > 1.0 - q;

@@ -6,7 +6,8 @@
 
 namespace alidade {
 
-/// Returns the quantile q, in [0, 1], of chi-square with `dof` > 0 degrees of freedom.
+/// Returns the q-quantile of the chi-square distribution with `dof` > 0 degrees of freedom. q is in
+/// [0, 1].
 double ChiSquareQuantile(double q, double dof);
 
 /// Closed interval.
@@ -14,28 +15,30 @@ struct Interval {
   double low, high;
 };
 
-/// Returns the interval that contains the mean of n independent values of chi2(dof) / dof with
-/// probability 0.95 [BarShalom2001, sec. 5.4]. It applies to the mean NEES or NIS of a consistent
-/// filter. n need not be an integer.
+/// Returns the interval that contains the mean of n independent samples of chi2(dof) / dof with
+/// probability 0.95 [BarShalom2001, sec. 5.4]. The interval applies to the mean NEES or NIS of a
+/// consistent filter. n need not be an integer.
 ///
 ///   [low, high] = m chi2(p, nu) / nu,   p = 0.025, 0.975,   nu = 2 n m^2 / v
 ///
-/// m and v are the mean and variance of one such value. Without a gate m = 1, v = 2 / dof and nu =
-/// n dof. A gate accepts only values of r' S^-1 r (not divided by dof) up to `cut`.
+/// m and v are the mean and variance of one sample. Without a gate, m = 1, v = 2 / dof, and
+/// nu = n dof. With a gate, the chi-square distribution is truncated at `cut`: the gate accepts
+/// only measurements with r' S^-1 r <= cut (not divided by dof).
 Interval ConsistencyBounds(double dof, double n,
                            double cut = std::numeric_limits<double>::infinity());
 
-/// Returns the quantile q, in [0, 1], of ascending values x[0..n-1], n > 0. Interpolates linearly
-/// between the values (type 7 of Hyndman and Fan):
+/// Returns the q-quantile of the ascending values x[0..n-1], n > 0. q is in [0, 1]. Interpolates
+/// linearly between the values (type 7 of Hyndman and Fan):
 ///
 ///   x[k] + (h - k) (x[k + 1] - x[k]),   h = (n - 1) q,   k = floor h
 double Quantile(const std::vector<double>& ascending, double q);
 
-/// Mean and quantiles of values.
+/// Mean and quantiles of a set of values. p05, p50 and p95 are the 5 %, 50 % and 95 % quantiles.
 struct Spread {
   double mean = 0.0, p05 = 0.0, p50 = 0.0, p95 = 0.0;
 };
-/// Returns the spread of the values that are not NaN. Every member is NaN if all values are NaN.
+/// Returns the spread of the values that are not NaN. Every member is NaN if there are no such
+/// values.
 Spread SpreadOf(std::vector<double> values);
 
 }  // namespace alidade

@@ -6,7 +6,7 @@
 
 namespace alidade::internal {
 
-/// Joins texts with a separator: `a, b, c`.
+/// Joins texts with a separator, for example to `a, b, c`.
 std::string Join(const std::vector<std::string>& parts, const char* separator = ", ");
 
 /// Returns the noun with its indefinite article: `a source`, `an estimator`.

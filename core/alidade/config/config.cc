@@ -65,7 +65,8 @@ void Merge(ConfigTree* base, ConfigTree* overrides) {
   }
 }
 
-/// Returns the first bytes of the file: at most one byte more than a config may have.
+/// Reads at most one byte more than the maximum size of a config. The parser then detects a file
+/// that is too large.
 std::string ReadConfig(const fs::path& file, const Place& place, std::string_view key) {
   constexpr std::size_t kLimit = (1 << 20) + 1;
   const auto fail = [&](ExitCode code, int error) {
@@ -80,7 +81,7 @@ std::unique_ptr<ConfigTree> ParseRoot(std::string_view text, const std::string& 
                                       Budget* budget) {
   auto root = internal::ParseYaml(text, Origin{name}, budget);
   if (root == nullptr || root->kind == Node::Kind::kNull) {
-    FailAt(Place{name}, {}, "file is empty", "a map of keys");
+    FailAt(Place{name}, {}, "the file is empty", "a map of keys");
   }
   if (root->kind != Node::Kind::kMap) {
     const bool scalar = root->kind == Node::Kind::kScalar;
@@ -90,9 +91,9 @@ std::unique_ptr<ConfigTree> ParseRoot(std::string_view text, const std::string& 
   return root;
 }
 
-/// Returns the values of `source` that are paths of input files, without lists and `-`. A plugin
-/// may use the keys other than `path` for other things. Their values therefore count as paths only
-/// if they contain a slash or name a file in `folder`.
+/// Returns the values of `source` that are paths of input files. Omits lists and `-`. The value of
+/// `path` always counts as a path. A plugin may use the other keys for values that are not paths.
+/// Such a value counts as a path only if it contains a slash or names an existing file in `folder`.
 std::vector<ConfigTree*> SourcePaths(const ConfigTree& root, const fs::path& folder) {
   std::vector<ConfigTree*> paths;
   const ConfigTree* const source = Child(root, "source");
@@ -153,7 +154,7 @@ class Loader {
     std::error_code ignored;
     const fs::path canonical = fs::weakly_canonical(file, ignored);
     if (std::find(open_files_.begin(), open_files_.end(), canonical) != open_files_.end()) {
-      FailAt(place, key, "includes itself: " + Quoted(file.string()));
+      FailAt(place, key, Quoted(file.string()) + " includes itself");
     }
     files_.push_back(file.string());
     if (files_.size() > kMaxFiles) FailAt(place, key, "too many includes", "at most 64 files");
@@ -224,7 +225,7 @@ std::vector<Step> ParseDotted(std::string_view dotted, const Place& place) {
   }
 }
 
-/// Returns the child of `node` at `step`. Adds the child to a map that does not contain it.
+/// Returns the child of `node` at `step`. Adds an empty child if `node` is a map without this key.
 std::unique_ptr<ConfigTree>* Descend(ConfigTree* node, const Step& step, const Place& place,
                                      std::string_view dotted) {
   const bool is_map_key = !step.name.empty();
@@ -236,12 +237,14 @@ std::unique_ptr<ConfigTree>* Descend(ConfigTree* node, const Step& step, const P
   const std::string& path = PathOf(*node);
   if (node->kind != (is_map_key ? Node::Kind::kMap : Node::Kind::kList)) {
     FailAt(place, dotted, Quoted(path) + (is_map_key ? " is not a map" : " is not a list"),
-           is_map_key ? "the key of a map" : "the key of a list");
+           is_map_key ? "a map before each key" : "a list before each index");
   }
   auto& children = node->children;
   if (!is_map_key) {
     if (step.index < children.size()) return &children[step.index];
-    FailAt(place, dotted, Quoted(path) + " has " + std::to_string(children.size()) + " items");
+    FailAt(place, dotted,
+           Quoted(path) + " has " + std::to_string(children.size()) +
+               (children.size() == 1 ? " item" : " items") + ", numbered from 0");
   }
   const auto found = std::find_if(children.begin(), children.end(),
                                   [&](const auto& child) { return child->key == step.name; });

@@ -33,7 +33,7 @@ class Node {
   Kind kind() const;
   bool is_map() const { return kind() == Kind::kMap; }
   const Place& place() const;
-  /// Key path from the root, as in `sensors.stereo.focal_px` or `source.columns[2]`.
+  /// Returns the key path from the root, such as `sensors.stereo.focal_px` or `source.columns[2]`.
   const std::string& path() const;
 
   /// Returns the root of the config.
@@ -56,25 +56,26 @@ class Node {
   double Number() const;
   /// Returns a number within [low, high]. `low_open` and `high_open` exclude the respective bound.
   double Number(double low, double high, bool low_open = false, bool high_open = false) const;
-  /// Returns an integer within [low, high], read as strictly as a Number. The smallest or largest
-  /// value of the type means that there is no bound.
+  /// Returns an integer within [low, high], with the strict syntax of Number(). The smallest or
+  /// largest value of the type means that there is no bound.
   std::int64_t Integer(std::int64_t low, std::int64_t high) const;
   bool Flag() const;  ///< accepts `true` and `false` only
-  /// Returns any scalar as it is written, without quotes. Numbers and flags are accepted as texts.
+  /// Returns the text of any scalar without its quotes. Also accepts numbers and flags.
   std::string Text() const;
   /// Returns the index of the scalar in `choices`. Fails if `choices` does not contain it.
   int Choice(const std::vector<std::string>& choices) const;
-  /// Returns a list of numbers; a single number counts as a list of one. If `size` < 0, any length
-  /// above zero is accepted.
+  /// Returns a list of numbers; a single number counts as a list of one number. If `size` < 0, any
+  /// length above zero is accepted.
   std::vector<double> Numbers(int size = -1) const;
 
-  /// Fails if this map has a key that was never read, and suggests the most similar known key. Also
-  /// checks each map below this one from which a key was read.
+  /// Fails if this map contains a key that was never read, and suggests the most similar known key.
+  /// Also checks each nested map from which at least one key was read.
   void RejectUnread() const;
-  /// Returns whether this map has a `key` that has not been read. The call does not count as a
-  /// read.
+  /// Returns true if this map contains `key` and the key has not been read. This call does not
+  /// count as a read.
   bool HasUnread(std::string_view key) const;
-  /// Declares `key` of this map as known without reading it, so RejectUnread() accepts it.
+  /// Declares `key` of this map as known without reading the value. RejectUnread() then accepts the
+  /// key.
   void Declare(std::string_view key) const;
 
   /// Returns this value as YAML that Config::Set can read.
@@ -93,35 +94,37 @@ class Node {
 /// share one tree.
 class Config {
  public:
-  /// Reads a file and the files that its `include:` names; values of the file replace those of the
-  /// included files. An included file must lie inside the folder of the file that includes it,
+  /// Reads a file and the files that its key `include` lists. Values of the file replace values of
+  /// the included files. An included file must lie inside the folder of the file that includes it,
   /// unless `allow_outside` is true. Relative paths (`source.path`, the items of `plugins`) are
-  /// resolved against the folder of their file. Errors: kInputMissing, kBadConfig, kNotTrusted.
+  /// resolved against the folder of the file that contains them. Errors: kInputMissing, kBadConfig,
+  /// kNotTrusted.
   static Config FromFile(const std::filesystem::path& file, bool allow_outside = false);
-  /// Reads YAML text, in which `include:` is an error. Messages use `name` as the name of the file.
+  /// Reads YAML text. The key `include` is an error in such a text. Messages use `name` as the name
+  /// of the file.
   static Config FromText(std::string_view text, std::string_view name);
 
   Node root() const;
-  /// Returns the folder of the file, or the current folder for a text.
+  /// Returns the folder of the file, or `.` if the config was read from a text.
   const std::filesystem::path& folder() const { return folder_; }
   const std::string& name() const { return name_; }
   /// Returns the files that an output must not replace: the config files and `source.path`.
   std::vector<std::string> inputs() const;
 
-  /// Sets `dotted.key` to `value`, read as YAML; missing maps on its path are created. Messages use
-  /// `origin` (such as `--set`) as the name of the file. The value `-` is read as a text. A
-  /// relative path is resolved against the current folder. Nodes of the replaced value become
-  /// invalid.
+  /// Sets `dotted_key`, such as `a.b[0]`, to `value`, which is parsed as YAML. Creates missing maps
+  /// on the path of the key. Messages use `origin` (such as `--set`) as the name of the file. The
+  /// value `-` is read as a text. A relative path is resolved against the current folder. Nodes of
+  /// the replaced value become invalid.
   void Set(std::string_view dotted_key, std::string_view value, std::string_view origin);
-  /// Returns a copy with `overrides` (a map) merged in. Maps are merged key by key; any other value
-  /// replaces the old one. A map whose `model:` or `type:` differs replaces the whole old map.
-  /// Messages report a merged value at its original place and key path. The record of the keys that
-  /// were read is not copied.
+  /// Returns a copy into which the map `overrides` is merged. Maps are merged key by key; any other
+  /// value replaces the old value. A map with a different `model` or `type` replaces the whole old
+  /// map. Messages report a merged value at its place and key path in `overrides`. The record of
+  /// the keys that were read is not copied.
   Config Merged(const Node& overrides) const;
   /// Returns a deep copy in which no key counts as read.
   Config Copy() const;
 
-  /// Returns the tree as YAML, in the order of the file; parsing it yields the same tree.
+  /// Returns the tree as YAML, in the order of the file. Parsing this YAML yields the same tree.
   std::string ToYaml() const;
 
  private:

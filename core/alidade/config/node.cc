@@ -105,7 +105,7 @@ std::vector<double> Node::Numbers(int size) const {
   } else {
     for (const Node& item : Items()) numbers.push_back(item.Number());
   }
-  if (size < 0 && numbers.empty()) Fail("an empty list", "at least one number");
+  if (size < 0 && numbers.empty()) Fail("the list is empty", "at least one number");
   if (size >= 0 && numbers.size() != static_cast<std::size_t>(size)) {
     Fail("has " + ItemCountText(numbers.size()), std::to_string(size));
   }
@@ -165,7 +165,7 @@ void internal::ExpectName(const std::string& name, const Node& node, const std::
            c == '-';
   };
   if (!name.empty() && std::all_of(name.begin(), name.end(), is_allowed)) return;
-  node.Fail(Quoted(name) + " cannot name " + owner, "letters, digits, _ and -");
+  node.Fail(Quoted(name) + " is not a valid name for " + owner, "letters, digits, _ and -");
 }
 
 }  // namespace alidade

@@ -18,7 +18,7 @@ constexpr std::size_t kMaxSize = 1 << 20;
 constexpr int kMaxUnclosed = 4096;
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
-/// Check of the characters and of the indentation of a YAML text.
+/// Checker of the characters and the indentation of a YAML text.
 class TextCheck {
  public:
   explicit TextCheck(const Origin& origin) : origin_(origin) {}
@@ -32,9 +32,11 @@ class TextCheck {
       if (size == 0) Fail("invalid UTF-8", "UTF-8 text");
       const std::string_view character = text.substr(0, size);
       text.remove_prefix(size);
-      if (character == kByteOrderMark) Fail("byte order mark inside the text");
+      if (character == kByteOrderMark) {
+        Fail("a byte order mark is allowed only at the start of the text");
+      }
       if (character[0] == '\r') {
-        if (!text.starts_with('\n')) Fail("carriage return without a line feed");
+        if (!text.starts_with('\n')) Fail("a carriage return is not followed by a line feed");
         continue;
       }
       CheckCharacter(character[0]);
@@ -51,16 +53,16 @@ class TextCheck {
 
  private:
   void CheckCharacter(char c) {
-    if (c == '\0') Fail("NUL byte", "text");
+    if (c == '\0') Fail("the text contains a NUL byte");
     if ((c > 0 && c < ' ' && c != '\t' && c != '\n') || c == 0x7F) {
       constexpr std::string_view kHex = "0123456789abcdef";
-      Fail(std::string("control character 0x") + kHex[c >> 4] + kHex[c & 15]);
+      Fail(std::string("control character 0x") + kHex[c >> 4] + kHex[c & 15] + " is not allowed");
     }
-    if (in_indent_ && c == '\t') Fail("tab in the indentation", "spaces");
+    if (in_indent_ && c == '\t') Fail("the indentation contains a tab", "spaces");
     if (column_ == 1) {
-      // yaml-cpp ignores such a line.
+      // yaml-cpp ignores a line that begins with '%'.
       if (c == '%' && has_begun_)
-        Fail("'%' begins a line", "quotes around a text that begins with '%'");
+        Fail("the line begins with '%'", "quotes around a text that begins with '%'");
       has_begun_ = has_begun_ || (c != '%' && c != '#' && c != ' ' && c != '\n');
     }
     if (c != ' ') in_indent_ = false;
@@ -84,13 +86,14 @@ class TextCheck {
   int column_ = 1;
   int unclosed_ = 0;
   bool in_indent_ = true;
-  bool has_begun_ = false;  ///< the document has begun, so no directive may follow
+  bool has_begun_ = false;  ///< true after the first content, which no directive may follow
 };
 
 /// Checks size, encoding and indentation. Returns the text without BOM and carriage returns.
 std::string CleanText(std::string_view text, const Origin& origin) {
   if (text.size() > kMaxSize) {
-    FailAt(Place{origin.file}, origin.key_prefix, "larger than 1 MiB", "a config of at most 1 MiB");
+    FailAt(Place{origin.file}, origin.key_prefix, "the config is larger than 1 MiB",
+           "at most 1 MiB");
   }
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   return TextCheck(origin).Run(text);
@@ -115,7 +118,7 @@ Extent Measure(const ConfigTree& tree) {
   return extent;
 }
 
-/// Replaces a short message of yaml-cpp by one that the writer of the file understands.
+/// Returns a clearer wording of a short message of yaml-cpp, or `message` itself.
 std::string RewordMessage(const std::string& message) {
   struct Phrase {
     std::string_view original, replacement;
@@ -126,7 +129,7 @@ std::string RewordMessage(const std::string& message) {
       {"end of map flow not found", "'{' is not closed, or a comma is missing"},
       {"end of sequence flow not found", "'[' is not closed, or a comma is missing"},
       {"illegal flow end", "']' or '}' has no opening bracket"},
-      {"illegal EOF in scalar", "quote is not closed"},
+      {"illegal EOF in scalar", "a quote is not closed"},
       {"illegal map value", "':' is not allowed here"},
       {"illegal block entry", "'-' is not allowed here"},
       {"unknown token", "text that starts like this must be quoted"},
@@ -137,7 +140,7 @@ std::string RewordMessage(const std::string& message) {
   return message;
 }
 
-/// Handler of the events of yaml-cpp that builds the tree.
+/// Builder of the tree, which handles the events of yaml-cpp.
 class TreeBuilder : public YAML::EventHandler {
  public:
   TreeBuilder(std::string_view text, const Origin& origin, Budget* budget)
@@ -149,7 +152,7 @@ class TreeBuilder : public YAML::EventHandler {
     if (++documents_ < 2) return;
     const bool marker =
         text_.substr(std::min<std::size_t>(mark.pos, text_.size())).starts_with("---");
-    Fail(mark, marker ? "second document" : "text after the end of the document",
+    Fail(mark, marker ? "a second document begins here" : "text after the end of the document",
          "one document in a file");
   }
   void OnDocumentEnd() override {}
@@ -165,7 +168,7 @@ class TreeBuilder : public YAML::EventHandler {
     const auto target = anchors_.find(anchor);
     if (target == anchors_.end()) Fail(mark, "an alias cannot refer to a key");
     for (const Frame& frame : stack_) {
-      if (frame.node == target->second) Fail(mark, "alias refers to itself");
+      if (frame.node == target->second) Fail(mark, "the alias refers to itself");
     }
     const Extent extent = Measure(*target->second);
     AddToBudget(mark, extent.nodes, extent.bytes);
@@ -176,9 +179,9 @@ class TreeBuilder : public YAML::EventHandler {
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                 const std::string& value) override {
     RejectTag(mark, tag);
-    if (value.find('\0') != std::string::npos) Fail(mark, "NUL character in a text");
+    if (value.find('\0') != std::string::npos) Fail(mark, "the text contains a NUL character");
     // The escapes \N and \_ of yaml-cpp 0.7 yield single bytes, which are not UTF-8.
-    if (!IsUtf8(value)) Fail(mark, "escape sequence that is not a valid character");
+    if (!IsUtf8(value)) Fail(mark, "the escape sequence is not a valid character");
     if (ExpectsKey()) return SetKey(mark, tag, value);
     ConfigTree* node = Add(mark, anchor, Node::Kind::kScalar, value.size());
     node->quoted = tag != "?";
@@ -280,7 +283,7 @@ class TreeBuilder : public YAML::EventHandler {
     budget_->nodes += nodes;
     budget_->bytes += bytes;
     if (budget_->is_within_limits()) return;
-    Fail(mark, "too large after its aliases are expanded",
+    Fail(mark, "the config is too large after its aliases are expanded",
          budget_->nodes > Budget::kMaxNodes ? "at most 100000 values" : "at most 8 MiB of text");
   }
 
@@ -346,10 +349,10 @@ class TreeBuilder : public YAML::EventHandler {
 std::string KeyDefect(const std::string& key) {
   constexpr std::size_t kMaxKeyLength = 256;
   if (!IsUtf8(key)) return "the key is not UTF-8";
-  if (key.size() > kMaxKeyLength) return "key longer than 256 bytes: " + Quoted(key);
+  if (key.size() > kMaxKeyLength) return "the key is longer than 256 bytes: " + Quoted(key);
   const auto is_control = [](char c) { return (c >= 0 && c < ' ') || c == 0x7F; };
   if (std::any_of(key.begin(), key.end(), is_control)) {
-    return "control character in the key " + Quoted(key);
+    return "the key contains a control character: " + Quoted(key);
   }
   return {};
 }

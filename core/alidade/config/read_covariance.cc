@@ -28,7 +28,7 @@ void CheckSymmetric(const Node& node, const Eigen::MatrixXd& covariance) {
         return '[' + std::to_string(row) + "][" + std::to_string(column) + "] is " +
                NumberText(covariance(row, column));
       };
-      node.Fail("not symmetric: " + entry(j, i) + ", " + entry(i, j), "a covariance");
+      node.Fail("not symmetric: " + entry(j, i) + ", but " + entry(i, j), "a symmetric matrix");
     }
   }
 }
@@ -55,7 +55,8 @@ void CheckPositive(const Node& node, const Eigen::MatrixXd& covariance) {
 }  // namespace
 
 std::vector<double> ReadCovariance(const Node& node, int size) {
-  const std::string expected = std::to_string(size) + " rows of " + std::to_string(size);
+  const std::string expected =
+      std::to_string(size) + " rows of " + std::to_string(size) + " numbers";
   if (node.kind() != Node::Kind::kList) node.Fail("not a list of rows", expected);
   const std::vector<Node> rows = node.Items();
   if (rows.size() != static_cast<std::size_t>(size)) {

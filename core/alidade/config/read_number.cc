@@ -17,7 +17,7 @@ std::size_t SkipDigits(std::string_view text, std::size_t offset) {
   return offset;
 }
 
-/// Form of a decimal number: [+-] digits [. digits] [e [+-] digits].
+/// Properties of a text with respect to the syntax [+-] digits [. digits] [e [+-] digits].
 struct Decimal {
   bool is_valid = false;
   bool is_integer = false;
@@ -56,8 +56,8 @@ std::string Interval(const char* kind, double low, double high, bool low_open, b
          (high_open ? ')' : ']');
 }
 
-/// Returns the text of an unquoted scalar that is a decimal number, without a leading '+'.
-/// `expected` is part of the error message.
+/// Returns the text of an unquoted scalar without a leading '+'. Fails unless the scalar is a
+/// decimal number. `expected` is the text after "expected" in the error message.
 std::string_view DecimalText(const ConfigTree& tree, const std::string& expected) {
   const Node node(&tree);
   if (tree.kind == Node::Kind::kNull) node.Fail("no value", expected);
@@ -78,7 +78,7 @@ double ReadNumber(const ConfigTree& tree, const std::string& expected) {
   double value = 0;
   const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
   if (result.ec != std::errc()) {
-    Node(&tree).Fail(Quoted(tree.text) + " is too large or too small for a number", expected);
+    Node(&tree).Fail(Quoted(tree.text) + " is too large or too small to be represented", expected);
   }
   return value;
 }

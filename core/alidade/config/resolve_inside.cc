@@ -20,14 +20,14 @@ fs::path ResolveInside(const fs::path& base, const std::string& path, bool allow
   const fs::path folder = base.empty() ? fs::path(".") : base;
   const fs::path joined = base / path;
   if (path.empty() || path.find('\0') != std::string::npos) {
-    internal::FailAt(place, key, "empty path", "a path");
+    internal::FailAt(place, key, "the path is empty", "a path");
   }
   if (allow_outside) return joined;
   const fs::path inside = internal::FollowLinks(fs::absolute(folder));
   const fs::path target = internal::FollowLinks(fs::absolute(joined));
   if (inside.empty() || target.empty() || !Contains(inside, target)) {
     throw Error(ExitCode::kNotTrusted,
-                ErrorLine(place, key, internal::Quoted(path) + " leaves its folder",
+                ErrorLine(place, key, internal::Quoted(path) + " is outside the permitted folder",
                           "a path inside " + internal::Quoted(folder.string())));
   }
   return joined;

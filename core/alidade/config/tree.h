@@ -20,8 +20,8 @@ struct ConfigTree {
   std::vector<std::unique_ptr<ConfigTree>> children;
 
   const ConfigTree* parent = nullptr;
-  std::string key;  ///< key, if this node is an entry of a map
-  int index = -1;   ///< index, if this node is an item of a list
+  std::string key;  ///< key of this node if it is an entry of a map
+  int index = -1;   ///< index of this node if it is an item of a list
   int key_line = 0;
   int key_column = 0;
 
@@ -43,7 +43,7 @@ struct Budget {
 
 constexpr int kMaxDepth = 64;
 
-/// Source of a YAML text, for the messages about it.
+/// Origin of a YAML text, which messages report.
 struct Origin {
   std::string file;
   std::string key_prefix = {};  ///< key path of the text's root, such as the key of `--set`
@@ -54,7 +54,7 @@ struct Origin {
 /// Reads one YAML document strictly. Returns null if the text has no document.
 std::unique_ptr<ConfigTree> ParseYaml(std::string_view text, const Origin& origin, Budget* budget);
 
-/// Returns the reason why `key` is not a valid key, or "".
+/// Returns the reason why `key` is not a valid key, or "" if it is valid.
 std::string KeyDefect(const std::string& key);
 
 /// Returns the key path of `tree`.
@@ -73,16 +73,17 @@ inline bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 /// Returns `text` with its ASCII letters in lower case, in any locale.
 std::string LowerCase(std::string_view text);
 
-/// Returns `text` in single quotes, shortened, with control characters escaped.
+/// Returns `text` in single quotes, for a message. Escapes control characters and replaces the part
+/// after the first 60 bytes by `...`.
 std::string Quoted(std::string_view text);
 
 /// Throws an Error kBadConfig whose message is ErrorLine() of these arguments.
 [[noreturn]] void FailAt(const Place& place, std::string_view key, std::string_view message,
                          std::string_view expected = {}, std::string_view suggestion = {});
 
-/// Rejects a name that is not a single word. Names become parts of column names (`target.depth`),
-/// metric keys (`rmse:target.depth@near`) and tables. `owner` describes the object that has the
-/// name, such as `a sensor`.
+/// Fails unless `name` consists of letters, digits, `_` and `-`. Names are parts of column names
+/// (`target.depth`) and metric keys (`rmse:target.depth@near`). `owner` describes the named object,
+/// such as `a sensor`.
 void ExpectName(const std::string& name, const Node& node, const std::string& owner);
 
 }  // namespace internal

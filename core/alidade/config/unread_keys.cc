@@ -48,9 +48,9 @@ KeyParts SplitUnit(std::string_view key) {
   }
 }
 
-/// Returns the unit of `written` if only its unit differs from that of `known`, as in `baseline_mm`
-/// for `baseline_m`; otherwise returns "". With `same_dimension`, both units must also have the
-/// same dimension.
+/// Returns the unit of `written` if the two keys differ only by their units, such as `baseline_mm`
+/// and `baseline_m`; otherwise returns "". If `same_dimension` is true, both units must also have
+/// the same dimension.
 std::string WrongUnit(std::string_view written, std::string_view known, bool same_dimension) {
   const KeyParts a = SplitUnit(written);
   const KeyParts b = SplitUnit(known);

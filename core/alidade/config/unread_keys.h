@@ -7,8 +7,8 @@
 
 #include "alidade/config/tree.h"
 
-/// Errors about missing or unknown keys. They suggest the key that was probably meant: a key with
-/// another unit, or with almost the same letters.
+/// Errors about missing or unknown keys. Each error suggests the key that the author of the config
+/// probably meant: a key with another unit, or with a similar spelling.
 namespace alidade::internal {
 
 /// Throws the error of the missing `key`. The message reports that `needed_by` needs the key,
@@ -16,7 +16,8 @@ namespace alidade::internal {
 [[noreturn]] void FailMissing(const ConfigTree& map, std::string_view key,
                               std::string_view needed_by);
 
-/// Appends a line for each unknown key of `map`, and of each map below from which a key was read.
+/// Appends an error line for each unknown key of `map` and of each nested map from which at least
+/// one key was read. Stops after 20 lines.
 void ListUnread(const ConfigTree& map, std::vector<std::string>& lines);
 
 }  // namespace alidade::internal

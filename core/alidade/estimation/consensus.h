@@ -21,13 +21,13 @@ class Consensus {
   /// Divides the measurements `rows` of a frame. Appends the support of the best hypothesis, and
   /// all measurements of sensors without outlier_rejection, to `inliers`, in the order of `rows`.
   /// Appends the other measurements to `remaining`. Each match is tried at most once. The number of
-  /// hypotheses is log(1 - confidence) / log(1 - q), with q the fraction of matches in the support.
-  /// Equal seeds result in the same order of hypotheses.
+  /// hypotheses is log(1 - confidence) / log(1 - q), if the fraction q of the matches supports the
+  /// best hypothesis. Equal seeds result in the same order of hypotheses.
   void Split(FilterState& f, std::span<PendingMeasurement* const> rows, std::uint64_t seed,
              std::vector<PendingMeasurement*>& inliers,
              std::vector<PendingMeasurement*>& remaining);
-  /// Returns whether a measurement outside the support passes a second gate, which is tested after
-  /// the update by the support.
+  /// Returns whether a measurement passes the rescue gate. This second gate is tested after the
+  /// update by the support, for measurements outside the support.
   bool PassesRescueGate(const PendingMeasurement& pending) const {
     return pending.report->nis <= rescue_[static_cast<std::size_t>(pending.sensor)];
   }
@@ -36,11 +36,12 @@ class Consensus {
   void FindBest(FilterState& f, std::uint64_t seed);
   void FindSupport(FilterState& f, std::size_t hypothesis);
 
-  std::vector<double> support_, rescue_;  ///< thresholds on r' R^-1 r and NIS, by sensor
+  /// By sensor: thresholds on r' R^-1 r for the support, and on the NIS for the rescue gate.
+  std::vector<double> support_, rescue_;
 
   // Reused memory.
-  Scratch<std::vector<PendingMeasurement*>>
-      matches_;                       ///< matches of sensors with outlier_rejection
+  /// Matches of sensors with outlier_rejection.
+  Scratch<std::vector<PendingMeasurement*>> matches_;
   std::vector<std::size_t> order_;    ///< order in which matches are tried
   std::vector<char> supports_;        ///< by match: whether it supports the current hypothesis
   std::vector<char> best_;            ///< by match: whether it supports the best hypothesis

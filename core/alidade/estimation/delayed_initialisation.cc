@@ -12,8 +12,8 @@ bool IsMissing(const FilterState& f, const RoleBinding& role) {
   return role.block >= 0 && !f.state.layout()[role.block].present;
 }
 
-/// Returns whether a measurement initialises a block. This is so if its sensor has exactly one
-/// block without a value, and the prior of this block names the sensor.
+/// Returns whether a measurement initialises a block. The block must be the only block of the
+/// sensor without a value, and the prior of the block must name the sensor.
 bool IsAwaited(const FilterState& f, const PendingMeasurement& pending) {
   const SensorBinding& sensor = *pending.binding;
   const int index = sensor.model->inverse().role;

@@ -15,15 +15,16 @@
 #include "alidade/model/autodiff_inverse.h"
 #include "alidade/model/model_members.h"
 
-/// Use of model structs (alidade/model/model.h) that are compiled into the program, without a
-/// plugin.
+/// Sensor and motion models that call model structs (alidade/model/model.h). The structs are
+/// compiled into the program, so that a plugin is not needed.
 namespace alidade {
 
-/// A struct derived from Sensor, or from Motion (alidade/model/model.h).
+/// Struct that is derived from Sensor (alidade/model/model.h).
 template <class Model>
 concept SensorStruct = requires {
   Model::kInitialises;
 };
+/// Struct that is derived from Motion (alidade/model/model.h).
 template <class Model>
 concept MotionStruct = requires {
   Model::kNoise;
@@ -31,7 +32,8 @@ concept MotionStruct = requires {
 
 namespace detail {
 
-/// Returns the space of a quantity with this geometry. `parts` are the factors of a product.
+/// Returns the space of a quantity with this geometry. If the geometry is a product, `parts` are
+/// the spaces of its factors.
 Space SpaceOf(const Quantity& quantity, const Geometry& geometry,
               const std::vector<Space>& parts = {});
 
@@ -125,8 +127,8 @@ MotionModel::Description DescribeMotion(const Model& model, std::string name) {
   return description;
 }
 
-/// Runs `call`, a call of `model`. If it throws, records the text of the exception as the error
-/// text of the model.
+/// Runs `call`, which calls `model`. If `call` throws, records the text of the exception as the
+/// error text of the model and returns kError.
 template <class Call>
 Status Guarded(const void* model, const Call& call) {
   try {
@@ -206,7 +208,7 @@ class DirectMotion final : public MotionModel {
     return detail::Guarded(this, [&] {
       Status status = Status::kOk;
       if (out.next != nullptr) {
-        // Set to NaN first: a model with blocks of dynamic size may not write all elements.
+        // NaN reveals elements that a model with blocks of dynamic size does not write.
         if constexpr (!detail::Blocks<Model>::kStatic) {
           for (std::size_t k = 0; k < this->blocks().size(); ++k) {
             std::fill_n(out.next[k], this->blocks()[k].geometry.ambient,

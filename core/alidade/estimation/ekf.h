@@ -13,19 +13,20 @@ namespace alidade {
 ///   step       x' = f(x, u, 0),   P' = F P F' + G Q G'
 ///   update     S = H P H' + R = L L',   W = P H' L^-T,   dx = W L^-1 r,   P -= W W'
 ///
-/// For small states S is factorised as L D L' instead of L L'; the result is the same. The gain of
-/// a consider block is 0 (Schmidt), which adds E E' to P, E = (K - K*) L with the optimal gain K*.
-/// If these formulas would lose digits by cancellation, the Joseph form is used instead. If the
-/// sensor has a robust loss, R / w(d) replaces R, d^2 = r' S^-1 r.
+/// For small states S is factorised as L D L' instead of L L', with an equivalent result. The gain
+/// of a consider block is 0 (Schmidt). This adds E E' to P, with E = (K - K*) L and the optimal
+/// gain K*. If these formulas would lose digits by cancellation, the Joseph form is used instead.
+/// If the sensor has a robust loss, R / w(d) replaces R, with d^2 = r' S^-1 r.
 ///
 /// A control input acts from the timestamp of its frame until the next input, but no longer than
 /// InputBinding::timeout_s. If no input acts, u is 0 (event `input_stale`). A gap that is longer
-/// than max_dt_s is divided into steps. The event `substeps` reports it if it has at least twice as
-/// many steps as any gap reported before.
+/// than max_dt_s is divided into steps. The event `substeps` reports a gap if it has at least twice
+/// as many steps as every gap that was reported before.
 ///
 /// Discrete noise w ~ N(0, I) is constant over an interval. The interval ends at any change of the
-/// state other than a step, so frames without an accepted measurement do not end it. Lq is
-/// evaluated at the start of the interval. M = Cov(x, w) is 0 at the start. Each step computes
+/// state other than a step. A frame without an accepted measurement therefore does not end the
+/// interval. Lq is evaluated at the start of the interval. M = Cov(x, w) is 0 at the start. Each
+/// step computes
 ///
 ///   N = G Lq,  A = F M:   P' = F P F' + A N' + N A' + N N',   M' = A + N
 ///
@@ -36,7 +37,7 @@ namespace alidade {
 /// internal::EkfEquations (ekf_equations.h) implements the equations.
 class Ekf : public Filter {
  public:
-  /// Every capability: an Ekf solves all problems.
+  /// An Ekf has all capabilities, so it supports every problem.
   static constexpr EstimatorCapabilities kCapabilities = {.consider = true,
                                                           .at_measurement = true,
                                                           .from_measurement = true,

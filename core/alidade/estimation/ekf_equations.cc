@@ -39,9 +39,10 @@ void EkfEquations::BeginUpdate(FilterState& f, int capacity) {
   return outcome;
 }
 
-/// Sets jacobian_roles_, the point at which H is evaluated. First estimates replace the values of
-/// the roles if first estimates are used. With `jacobian_at: measurement`, the value that z implies
-/// replaces the value of the role. Returns whether H is evaluated at another point than h.
+/// Sets jacobian_roles_, the values of the roles at which H is evaluated. If first estimates are
+/// used, they replace the values of the roles. With `jacobian_at: measurement`, the value that z
+/// implies replaces the value of the role. Returns whether H and h are evaluated at different
+/// points.
 [[gnu::noinline]] bool EkfEquations::FindLinearisation(const FilterState& f,
                                                        const PendingMeasurement& pending) {
   const std::vector<RoleBinding>& bound = pending.binding->roles;
@@ -127,8 +128,9 @@ void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* c
                        consider_rows_.end());
 }
 
-/// Computes the gain of the consider rows: K* with zeros for consider states. Writes the gain and
-/// the resulting dx to f.update.
+/// Computes the gain of the rows consider_rows_. The gain equals K*, but is zero for the
+/// measurements whose sensor treats the row as a consider state. Writes the gain and the resulting
+/// dx to f.update.
 [[gnu::noinline]] EkfEquations::ConsiderGain EkfEquations::ConsiderCorrection(
     FilterState& f, std::span<PendingMeasurement* const> rows, bool recorded) {
   const Eigen::Index count = std::ssize(consider_rows_), m = f.update.rows();
@@ -163,7 +165,8 @@ void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* c
 }
 
 /// Updates P by the Joseph form, which does not lose digits by cancellation. `consider_gain` is the
-/// gain of the consider rows. Returns false if a variance would be negative.
+/// gain of the rows consider_rows_; it may be null if there are no such rows. Returns false if a
+/// variance would be negative.
 [[gnu::noinline]] bool EkfEquations::Joseph(FilterState& f,
                                             std::span<PendingMeasurement* const> rows,
                                             const Workspace::Matrix* consider_gain) {
@@ -206,7 +209,7 @@ void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* c
       AddOuterProduct(f.state.covariance().lower(), consider_rows_, consider_gain->e);
     }
   }
-  f.state.MoveTo(f.moved);  // last step, because MoveTo also transports P to the new tangent spaces
+  f.state.MoveTo(f.moved);  // must come last, because MoveTo also transports P
   if (recorded) {
     RecordGainBy(f, rows,
                  [&](std::span<const int> p_rows, int column, int count, double* destination) {

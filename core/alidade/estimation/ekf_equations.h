@@ -9,7 +9,7 @@
 
 namespace alidade::internal {
 
-/// Equations of the extended Kalman filter, as documented at Ekf. P is a dense matrix.
+/// Equations of the extended Kalman filter; the comment on Ekf states them. P is a dense matrix.
 class EkfEquations : public UpdateMethod {
  public:
   std::unique_ptr<UpdateMethod> Clone() const override {
@@ -23,7 +23,8 @@ class EkfEquations : public UpdateMethod {
     return CorrectBy(f, rows, nullptr);
   }
 
-  /// Corrects P as Correct does. Adds `correction` to x, or K r if `correction` is null.
+  /// Corrects P as Correct does, and sets x <- x (+) `correction`. If `correction` is null, sets x
+  /// <- x (+) K r instead.
   Outcome CorrectBy(FilterState& f, std::span<PendingMeasurement* const> rows,
                     const double* correction);
   /// Assigns consecutive columns of the update to the measurements `rows`, which may be a subset of
@@ -45,8 +46,8 @@ class EkfEquations : public UpdateMethod {
               const Workspace::Matrix* consider_gain);
 
   // Reused memory.
-  Roles jacobian_roles_{};                      ///< the point at which H is evaluated
-  Scratch<std::vector<double>> implied_value_;  ///< for roles with `jacobian_at: measurement`
+  Roles jacobian_roles_{};                      ///< values of the roles at which H is evaluated
+  Scratch<std::vector<double>> implied_value_;  ///< value that z implies, for `jacobian_at`
   Scratch<std::vector<double>> jacobian_h_;     ///< h at jacobian_roles_
   Scratch<std::vector<const MeasurementRows*>> stacked_;  ///< measurements of the update
   Scratch<std::vector<int>> consider_rows_;  ///< rows of P that do not use the optimal gain

@@ -22,7 +22,8 @@ namespace alidade {
 
 class Filter;
 
-/// Result of processing one measurement. kOutcomes documents the values.
+/// Result of processing one measurement. kOutcomes documents the values. A measurement that was not
+/// yet processed has the value kAccepted.
 enum class Outcome {
   kAccepted,
   kInitialised,
@@ -53,43 +54,48 @@ struct OutcomeInfo {
 inline constexpr std::array kOutcomes = {
     OutcomeInfo{.outcome = Outcome::kAccepted,
                 .name = "accepted",
-                .meaning = "the update used it (also the value before the frame is processed)"},
+                .meaning = "an update used the measurement"},
     OutcomeInfo{.outcome = Outcome::kInitialised,
                 .name = "initialised",
-                .meaning = "it initialised a block and was not used for an update",
+                .meaning = "the measurement initialised a block; no update used it",
                 .is_initialisation = true},
     OutcomeInfo{.outcome = Outcome::kGated,
                 .name = "gated",
-                .meaning = "the gate or the outlier rejection rejected it",
+                .meaning = "the gate or the outlier rejection rejected the measurement",
                 .is_rejection = true,
                 .is_gated = true},
     OutcomeInfo{.outcome = Outcome::kOutOfDomain,
                 .name = "out_of_domain",
                 .meaning = "h is not defined at the prediction",
                 .is_rejection = true},
-    OutcomeInfo{
-        .outcome = Outcome::kInvalid,
-        .name = "invalid",
-        .meaning = "it is beyond the limits of the sensor, or its covariance is not a covariance"},
+    OutcomeInfo{.outcome = Outcome::kInvalid,
+                .name = "invalid",
+                .meaning = "the measurement is beyond the limits of the sensor, or its covariance "
+                           "matrix is invalid"},
     OutcomeInfo{.outcome = Outcome::kNotFinite,
                 .name = "not_finite",
-                .meaning = "z, h, H, R, S or the update is not finite; an update was rolled back",
+                .meaning = "z, h, H, R, S or the result of the update is not finite; the state is "
+                           "unchanged",
                 .is_rejection = true},
     OutcomeInfo{
         .outcome = Outcome::kNotPd,
         .name = "not_pd",
         .meaning = "S or P would not have been positive definite; the update was rolled back",
         .is_rejection = true},
-    OutcomeInfo{
-        .outcome = Outcome::kStale, .name = "stale", .meaning = "it is older than the state"},
+    OutcomeInfo{.outcome = Outcome::kStale,
+                .name = "stale",
+                .meaning = "the measurement is older than the state"},
     OutcomeInfo{.outcome = Outcome::kNotReady,
                 .name = "not_ready",
                 .meaning = "a required block has no value yet",
                 .is_initialisation = true},
-    OutcomeInfo{.outcome = Outcome::kFailed, .name = "failed", .meaning = "the plugin failed"},
+    OutcomeInfo{.outcome = Outcome::kFailed,
+                .name = "failed",
+                .meaning = "the sensor model reported an error"},
     OutcomeInfo{.outcome = Outcome::kEnded,
                 .name = "ended",
-                .meaning = "it was not processed, because the estimator had already ended"},
+                .meaning = "the measurement was not processed, because the estimator had already "
+                           "ended"},
 };
 static_assert(
     [] {
@@ -98,12 +104,12 @@ static_assert(
       }
       return kOutcomes.back().outcome == Outcome::kEnded;
     }(),
-    "one row for each outcome, in the order of Outcome");
+    "kOutcomes must have one entry for each Outcome, in the order of Outcome");
 /// Returns the properties of an outcome.
 inline const OutcomeInfo& InfoOf(Outcome outcome) {
   return kOutcomes[static_cast<std::size_t>(outcome)];
 }
-/// Returns the name of an outcome in files: `accepted`, `gated`.
+/// Returns the name of an outcome in files, such as `accepted`.
 inline const char* ToString(Outcome outcome) { return InfoOf(outcome).name; }
 /// Converts the status of a model to the outcome of the measurement. kOk becomes kAccepted.
 inline Outcome OutcomeOf(Status status) {
@@ -126,9 +132,9 @@ struct Numbers : std::span<const double> {
   friend bool operator==(const Numbers& a, const Numbers& b) { return std::ranges::equal(a, b); }
 };
 
-/// Result of one measurement. m: tangent size of the measurement (dof). The numbers belong to the
-/// estimator and are valid until its next frame. A copy of an UpdateReport stores its own numbers.
-/// A view is empty if the quantity was not computed.
+/// Result of one measurement. m: tangent size of the measurement (dof). The estimator owns the
+/// numbers, which are valid until it processes the next frame. A copy of an UpdateReport owns its
+/// numbers. A view is empty if the quantity was not computed.
 struct MeasurementReport {
   MeasurementReport() = default;
   MeasurementReport(int sensor_index, Outcome result, std::int64_t landmark_id, int tangent_size)
@@ -138,7 +144,7 @@ struct MeasurementReport {
   Outcome outcome = Outcome::kAccepted;
   std::int64_t landmark = -1;
   int dof = 0;
-  double nis = 0.0;    ///< r' S^-1 r, not divided by dof; S without the weight w
+  double nis = 0.0;    ///< r' S^-1 r, not divided by dof; here S is computed with w = 1
   Numbers z, h;        ///< measurement and its prediction, ambient
   Numbers innovation;  ///< r = z (-) h, size m
   Numbers s;           ///< S = H P H' + R / w, m x m; w = 1 without a robust loss
@@ -147,8 +153,9 @@ struct MeasurementReport {
   Numbers gain;
 };
 
-/// Reports of the measurements of a frame. Usually points to numbers in the estimator. Copy stores
-/// numbers in this object, and a copy of this object stores all its numbers.
+/// Reports of the measurements of a frame. The entries usually point to numbers that the estimator
+/// owns. The function Copy stores numbers in this object. A copy of this object stores the numbers
+/// of all entries.
 class MeasurementReports {
  public:
   MeasurementReports() = default;
@@ -176,7 +183,8 @@ class MeasurementReports {
   std::vector<std::vector<double>> numbers_;
 };
 
-/// Parts of the processing of a frame, in their order. Filter documents them.
+/// Parts of the processing of a frame, in the order of execution. The comment on Filter describes
+/// the processing.
 enum class FramePart { kStep, kEvaluate, kGate, kUpdate, kLandmarks };
 inline constexpr int kFrameParts = static_cast<int>(FramePart::kLandmarks) + 1;
 
@@ -203,21 +211,22 @@ class UpdateReport {
   }
   void ClearMeasurements() { measurements_.Clear(); }
 
-  bool stale = false;       ///< the frame is older than the state and was not processed
-  std::vector<int> inputs;  ///< indices into Problem::motions of the control inputs that were set
+  bool stale = false;  ///< the frame is older than the state and was not processed
+  /// Motion models whose control input this frame set, as indices into Problem::motions.
+  std::vector<int> inputs;
   std::vector<Event> events;
   LandmarkCounts landmarks;
   /// Last estimates of the landmarks that were removed from the state at this frame. Empty for a
   /// batch.
   std::vector<LandmarkEstimate> removed_landmarks;
-  /// Wall-clock time of each FramePart. Measured only by filters with landmarks.
+  /// Wall-clock time of each FramePart, in s. Only filters with landmarks measure the times.
   std::array<double, kFrameParts> spent_s{};
 
  private:
   MeasurementReports measurements_;
 };
 
-/// Estimator for one problem. An estimator does not read files, print or end the program.
+/// Estimator for one problem. An estimator does not read files, print text or end the program.
 class Estimator {
  public:
   /// Function that receives the estimate and the report of frame `index`. The frame of the first
@@ -230,18 +239,18 @@ class Estimator {
   /// Propagates the state to the timestamp of the frame, and uses the measurements of all streams
   /// that have a sensor. The report is valid until the next call.
   virtual const UpdateReport& Process(const Frame& frame) = 0;
-  /// Returns whether the estimates depend on later frames too (a smoother, a batch). If so, state()
-  /// is not meaningful after Process, and Smooth computes the estimates.
+  /// Returns whether the estimates also depend on later frames, as those of a smoother or a batch.
+  /// If so, state() is not meaningful after Process, and Smooth computes the estimates.
   virtual bool offline() const { return false; }
   /// Computes the estimates of all frames and passes them to `emit` in the order of the frames.
-  /// Called once, after the last frame. The events of the smoothing itself are in the last report.
-  /// If an estimate cannot be computed, throws an Error with the reason, and failed() is true.
-  /// Exceptions of `emit` propagate.
+  /// Must be called once, after the last frame. The report of the last frame contains the events of
+  /// the smoothing. If an estimate cannot be computed, throws an Error with the reason; failed() is
+  /// then true. Exceptions of `emit` propagate.
   virtual void Smooth(const Emit& /*emit*/) {}
-  /// Sets a function that Smooth calls repeatedly while it runs. If the function returns true,
-  /// Smooth throws an Error kStopped. If the function is null, Smooth is never stopped.
+  /// Sets a function that Smooth calls repeatedly. If the function returns true, Smooth throws an
+  /// Error kStopped. If the function is null, Smooth is never stopped.
   virtual void StopWhen(const std::function<bool()>& /*stop*/) {}
-  /// Returns a copy whose later results equal those of this estimator bit by bit, or null if the
+  /// Returns a copy that computes bit-identical results from the same later frames, or null if the
   /// estimator cannot be copied.
   virtual std::unique_ptr<Estimator> Clone() const { return nullptr; }
   /// Returns this estimator as a recursive filter, or null if it is not a recursive filter.
@@ -250,10 +259,10 @@ class Estimator {
   /// Returns the landmarks in the state, ordered by id.
   virtual std::vector<LandmarkEstimate> landmarks() const { return {}; }
   virtual Timestamp timestamp() const = 0;
-  /// Returns whether the filter diverged: its estimate left the domain of a sensor, or its numbers
-  /// became invalid. An event reports the reason.
+  /// Returns whether the estimator diverged: the estimate left the domain of a model, or a step or
+  /// update failed so that the estimator ended. An event reports the reason.
   virtual bool diverged() const = 0;
-  /// Returns whether the estimator ended early because it cannot continue.
+  /// Returns whether the estimator ended before the last frame because of an error.
   virtual bool failed() const = 0;
 };
 

@@ -16,7 +16,7 @@ std::optional<ProblemDefect> FindUnsupportedBlock(const Problem& problem,
   const std::vector<Block>& blocks = problem.layout.blocks();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     if (blocks[b].status != BlockStatus::kConsider || capabilities.consider) continue;
-    return ProblemDefect{"consider", "consider blocks", "the block estimated or constant",
+    return ProblemDefect{"consider", "consider blocks", "a block that is estimated or constant",
                          static_cast<BlockId>(b)};
   }
   for (const Prior& prior : problem.priors) {
@@ -25,7 +25,7 @@ std::optional<ProblemDefect> FindUnsupportedBlock(const Problem& problem,
                          "mean and sigma", prior.block};
   }
   if (problem.landmarks && !capabilities.landmarks) {
-    return ProblemDefect{"landmarks", "landmarks", "`sensors` that measure no landmarks"};
+    return ProblemDefect{"landmarks", "landmarks", "`sensors` that do not measure landmarks"};
   }
   return std::nullopt;
 }
@@ -44,7 +44,7 @@ std::optional<ProblemDefect> FindUnsupportedMode(const RoleBinding& role,
   return std::nullopt;
 }
 
-/// Returns the sensor that a block starts from, or null if that name does not exist.
+/// Returns the sensor from which a block starts, or null if the problem has no such sensor.
 const SensorBinding* SensorOf(const Problem& problem, const Prior& prior) {
   const int index = problem.FindSensor(prior.sensor);
   return index < 0 ? nullptr : &problem.sensors[static_cast<std::size_t>(index)];
@@ -54,7 +54,7 @@ const SensorBinding* SensorOf(const Problem& problem, const Prior& prior) {
 std::optional<ProblemDefect> CheckStart(const Problem& problem, const Prior& prior) {
   const SensorBinding* const sensor = SensorOf(problem, prior);
   if (sensor == nullptr) {
-    ProblemDefect defect{"from_measurement", "no sensor '" + prior.sensor + "' in this estimator",
+    ProblemDefect defect{"from_measurement", "this estimator has no sensor '" + prior.sensor + "'",
                          "a sensor of this estimator", prior.block};
     defect.nearest = Nearest(prior.sensor, internal::NamesOf(problem.sensors));
     return defect;
@@ -66,15 +66,16 @@ std::optional<ProblemDefect> CheckStart(const Problem& problem, const Prior& pri
       "a sensor whose inverse measurement model determines this block", prior.block};
 }
 
-/// Follows the blocks that must have a value before the last block of `chain` can start. Returns
-/// the first cycle among them. Requires that every sensor from which a block starts exists.
+/// Searches the blocks that must have a value before the last block of `chain` can start. Returns
+/// the first cycle among these blocks, or nullopt. Every sensor from which a block starts must
+/// exist.
 std::optional<ProblemDefect> FindCycle(const Problem& problem, std::vector<BlockId>& chain) {
   const BlockId last = chain.back();
   if (std::ranges::find(chain, last) != chain.end() - 1) {
     std::vector<std::string> names;
     for (const BlockId block : chain) names.push_back(problem.layout[block].name);
     return ProblemDefect{"from_measurement",
-                         "cyclic initialisation: " + internal::Join(names, " <- "),
+                         "the initialisation is cyclic: " + internal::Join(names, " <- "),
                          "a mean for one block of the cycle", last};
   }
   const auto prior = std::ranges::find(problem.priors, last, &Prior::block);
@@ -156,7 +157,7 @@ Problem CheckedProblem(Problem problem, const char* estimator,
   const std::string name = estimator;
   if (const auto defect = FindUnsupported(problem, capabilities)) {
     throw Error(ExitCode::kBadConfig,
-                name + " does not support " + Describe(*defect, problem) + ", or an Ekf");
+                name + " does not support " + Describe(*defect, problem) + "; or use an Ekf");
   }
   if (const auto defect = FindDefect(problem)) {
     throw Error(ExitCode::kBadConfig,

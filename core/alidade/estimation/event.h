@@ -51,7 +51,7 @@ enum class EventKind {
 enum class EventSeverity {
   kInfo,     ///< recorded for information only
   kWarning,  ///< the estimates may be worse than their covariance indicates
-  kError,    ///< the estimator, or one of its sensors, ended
+  kError,    ///< the estimator ended, or one of its models failed
 };
 
 /// Name, severity and meaning of a kind of event.
@@ -65,16 +65,17 @@ struct EventKindInfo {
 /// All kinds of events. To add a kind, add a value of EventKind and an entry here.
 inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kDiverged, "diverged", EventSeverity::kError,
-                  "an estimate left the domain of its models; the estimator ended"},
+                  "an estimate left the domain of a model; if this is a motion model, the "
+                  "estimator ended"},
     EventKindInfo{EventKind::kFailed, "failed", EventSeverity::kError,
                   "the estimator failed with an error and ended"},
     EventKindInfo{EventKind::kStopped, "stopped", EventSeverity::kError,
-                  "the estimator was stopped before it had finished smoothing"},
+                  "the estimator was stopped before the smoothing finished"},
     EventKindInfo{EventKind::kPluginFailed, "plugin_failed", EventSeverity::kError,
                   "a model of a plugin failed for this measurement"},
     EventKindInfo{EventKind::kSensorDisabled, "sensor_disabled", EventSeverity::kWarning,
-                  "the sensor's model failed; the sensor is not used any more (`on_plugin_failure: "
-                  "disable`)"},
+                  "the model of a sensor failed; the sensor is not used any more "
+                  "(`on_plugin_failure: disable`)"},
     EventKindInfo{EventKind::kInconsistent, "inconsistent", EventSeverity::kWarning,
                   "the error of a block element exceeded 10 sigma for 20 timestamps in a row; "
                   "requires truth"},
@@ -84,19 +85,19 @@ inline constexpr std::array kEventKinds = {
                   "a mean NIS is outside its 95 % bounds"},
     EventKindInfo{EventKind::kUnit, "unit", EventSeverity::kWarning,
                   "the measurements of a sensor are so far from their predictions that their unit "
-                  "may differ from the model's"},
+                  "may differ from the unit of the model"},
     EventKindInfo{EventKind::kUnused, "unused", EventSeverity::kWarning,
                   "the estimator used no measurement of this sensor; the text states the reason"},
     EventKindInfo{EventKind::kTruth, "truth", EventSeverity::kWarning,
-                  "the source has a truth, but no frame contained a value of it"},
+                  "the source provides ground truth, but no frame contained a true value"},
     EventKindInfo{EventKind::kUnobservable, "unobservable", EventSeverity::kWarning,
-                  "no sensor of this estimator determines this direction of the state"},
+                  "the sensors of this estimator do not determine this direction of the state"},
     EventKindInfo{
         EventKind::kObservability, "observability", EventSeverity::kInfo,
         "unobservable directions were not computed, because the state has more than 500 elements"},
     EventKindInfo{EventKind::kRejectionRecovery, "rejection_recovery", EventSeverity::kWarning,
-                  "many measurements of a sensor in a row were rejected; the filter reset or "
-                  "inflated blocks"},
+                  "a sensor reached the limit of consecutive rejections; the filter reset blocks "
+                  "or inflated their covariance"},
     EventKindInfo{
         EventKind::kRepaired, "repaired", EventSeverity::kWarning,
         "a covariance lost positive semi-definiteness and was repaired (`max_covariance_repairs`)"},
@@ -104,7 +105,8 @@ inline constexpr std::array kEventKinds = {
         EventKind::kNotPd, "not_pd", EventSeverity::kWarning,
         "S, or P after the update, would not be positive definite; the update was rolled back"},
     EventKindInfo{EventKind::kNotFinite, "not_finite", EventSeverity::kWarning,
-                  "a measurement, h, H, R or the update is not finite; it was not used"},
+                  "a number of a measurement, step or update is not finite; the measurement, step "
+                  "or update was not used"},
     EventKindInfo{EventKind::kConditioning, "conditioning", EventSeverity::kWarning,
                   "S is so ill-conditioned that the update loses digits"},
     EventKindInfo{EventKind::kGuarded, "guarded", EventSeverity::kWarning,
@@ -112,24 +114,25 @@ inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kNotConverged, "not_converged", EventSeverity::kWarning,
                   "an iteration ended before it converged"},
     EventKindInfo{EventKind::kStale, "stale", EventSeverity::kWarning,
-                  "the frame is older than the state and was not used; reported "
-                  "once for consecutive frames"},
+                  "the frame is older than the state and was not used; consecutive stale frames "
+                  "are reported once"},
     EventKindInfo{EventKind::kOutOfSequence, "out_of_sequence", EventSeverity::kWarning,
-                  "the frame was dropped: it is older than `out_of_sequence.window_s` allows"},
+                  "the frame is older than `out_of_sequence.window_s` allows and was dropped"},
     EventKindInfo{EventKind::kInputStale, "input_stale", EventSeverity::kWarning,
                   "a motion model uses u = 0: no control input has arrived, or the last one is "
                   "older than `timeout_s`"},
     EventKindInfo{
         EventKind::kInputRefused, "input_refused", EventSeverity::kWarning,
-        "a control input is not finite or not of unit length; reported once until an input is "
-        "accepted"},
+        "a control input is not finite or does not have unit length; reported once until an input "
+        "is accepted"},
     EventKindInfo{EventKind::kSubsteps, "substeps", EventSeverity::kInfo,
                   "a gap longer than `max_dt_s` was divided into at least twice as many steps as "
-                  "in the last report"},
+                  "the last reported gap"},
     EventKindInfo{EventKind::kTooManySubsteps, "too_many_substeps", EventSeverity::kError,
                   "a gap between timestamps needs more steps than allowed; the estimator ended"},
     EventKindInfo{EventKind::kSolution, "solution", EventSeverity::kInfo,
-                  "the batch ended; the text states its iterations, and whether it converged"},
+                  "the batch finished; the text states the number of iterations and whether the "
+                  "batch converged"},
     EventKindInfo{EventKind::kNoSolution, "no_solution", EventSeverity::kError,
                   "the batch has no solution"},
     EventKindInfo{EventKind::kInitialEstimate, "initial_estimate", EventSeverity::kWarning,
@@ -147,7 +150,7 @@ inline constexpr std::array kEventKinds = {
         EventKind::kSlow, "slow", EventSeverity::kInfo,
         "the batch has many noise inputs; the time of a solve grows with the cube of their number"},
     EventKindInfo{EventKind::kEstimatorSpecific, "estimator_specific", EventSeverity::kInfo,
-                  "an event of an estimator plugin that has no kind of its own"},
+                  "an event of an estimator plugin to which no other kind applies"},
 };
 static_assert(
     [] {
@@ -156,7 +159,7 @@ static_assert(
       }
       return kEventKinds.back().kind == EventKind::kEstimatorSpecific;
     }(),
-    "one entry for each kind, in the order of EventKind");
+    "kEventKinds must have one entry for each EventKind, in the order of EventKind");
 
 /// Returns the entry of a kind.
 inline const EventKindInfo& InfoOf(EventKind kind) {
@@ -170,7 +173,7 @@ inline const char* ToString(EventSeverity severity) {
   return kNames[static_cast<std::size_t>(severity)];
 }
 
-/// Event during a run that an estimator reports to its user.
+/// Event that an estimator reports to its user during a run.
 struct Event {
   /// Timestamp of the frame. kNoTimestamp: the event concerns the whole run.
   Timestamp timestamp = kNoTimestamp;

@@ -18,19 +18,19 @@ namespace {
 
 [[noreturn]] void ThrowUnknownName(const char* kind, std::string_view name,
                                    const std::vector<std::string>& names) {
-  throw Error(ExitCode::kBadConfig, "no " + std::string(kind) + " '" + std::string(name) +
-                                        "'; expected " + internal::Join(names));
+  throw Error(ExitCode::kBadConfig, "the problem has no " + std::string(kind) + " '" +
+                                        std::string(name) + "'; expected " + internal::Join(names));
 }
 
 void CheckKnown(const std::string& place, int size, const std::vector<double>& known) {
   if (std::ssize(known) == size) return;
-  throw Error(ExitCode::kBadData, place + ": " + std::to_string(known.size()) +
-                                      " known numbers in a measurement; expected " +
+  throw Error(ExitCode::kBadData, place + ": the number of known numbers of a measurement is " +
+                                      std::to_string(known.size()) + "; expected " +
                                       std::to_string(size));
 }
 
-/// Returns the index of the sensor. Throws an Error if the sensor does not exist, or its model
-/// needs another number of known numbers.
+/// Returns the index of the sensor. Throws an Error if the sensor does not exist, or if the size of
+/// `known` differs from the number of known numbers that its model needs.
 int FindSensor(const Problem& problem, std::string_view name, const std::vector<double>& known) {
   const int index = problem.FindSensor(name);
   if (index < 0) ThrowUnknownName("sensor", name, internal::NamesOf(problem.sensors));
@@ -45,14 +45,15 @@ void CheckReading(const std::vector<StreamInfo>& streams, const Problem& problem
     throw Error(ExitCode::kBadData,
                 reading.stream < 0
                     ? "a reading has no stream; expected a sensor, or a state with a control input"
-                    : "no stream " + std::to_string(reading.stream) + "; expected an index below " +
-                          std::to_string(streams.size()));
+                    : "a reading has the stream index " + std::to_string(reading.stream) +
+                          "; expected an index below " + std::to_string(streams.size()));
   }
   const StreamInfo& stream = streams[static_cast<std::size_t>(reading.stream)];
   if (std::ssize(reading.values) != stream.size) {
-    throw Error(ExitCode::kBadData,
-                "stream '" + stream.name + "': " + std::to_string(reading.values.size()) +
-                    " values in a measurement; expected " + std::to_string(stream.size));
+    throw Error(ExitCode::kBadData, "stream '" + stream.name +
+                                        "': the number of values of a measurement is " +
+                                        std::to_string(reading.values.size()) + "; expected " +
+                                        std::to_string(stream.size));
   }
   CheckKnown("stream '" + stream.name + '\'', stream.known, reading.known);
   for (const SensorBinding& sensor : problem.sensors) {
@@ -60,16 +61,17 @@ void CheckReading(const std::vector<StreamInfo>& streams, const Problem& problem
     const Geometry& geometry = sensor.model->measurement().geometry;
     const double defect = DistanceFrom(geometry, reading.values.data());
     if (defect > kUnitTolerance) {
-      throw Error(ExitCode::kBadData,
-                  "stream '" + stream.name +
-                      "': the values do not have unit length: the length differs from 1 by " +
-                      internal::RoundedText(defect, 4));
+      throw Error(ExitCode::kBadData, "stream '" + stream.name +
+                                          "': the length of the values differs from 1 by " +
+                                          internal::RoundedText(defect, 4) +
+                                          "; expected a unit vector or unit quaternion");
     }
     const int m = geometry.tangent;
     if (reading.covariance.empty() || std::ssize(reading.covariance) == m * m) continue;
-    throw Error(ExitCode::kBadData, "stream '" + stream.name + "': the covariance has " +
-                                        std::to_string(reading.covariance.size()) +
-                                        " numbers; expected " + std::to_string(m * m));
+    throw Error(ExitCode::kBadData, "stream '" + stream.name +
+                                        "': the number of covariance elements is " +
+                                        std::to_string(reading.covariance.size()) + "; expected " +
+                                        std::to_string(m * m));
   }
 }
 

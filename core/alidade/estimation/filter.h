@@ -23,13 +23,14 @@ enum class Fuse {
 
 /// Reaction to `rejection_recovery_after` consecutive rejections of one sensor.
 enum class RejectionRecovery {
-  /// Re-initialise the block that the measurement determines. If that is not possible, inflate.
+  /// Re-initialises the block that the measurement determines. If this is not possible, acts as
+  /// kInflate.
   kReset,
-  kInflate,  ///< multiply the covariance of the sensor's blocks by 100
-  kNone,
+  kInflate,  ///< multiplies the covariance of the sensor's blocks by 100
+  kNone,     ///< does nothing
 };
 
-/// Value of the blocks of stationary motion models (`constant`) at which H is evaluated
+/// Value at which H is evaluated for blocks of stationary motion models, such as `constant`
 /// [Huang2010].
 enum class JacobianPolicy {
   kLatest,  ///< the latest estimate
@@ -44,7 +45,7 @@ struct EkfOptions {
   Fuse fuse = Fuse::kJoint;
   JacobianPolicy jacobian = JacobianPolicy::kLatest;
   RejectionRecovery rejection_recovery = RejectionRecovery::kReset;
-  int rejection_recovery_after = 20;  ///< consecutive rejections of one sensor
+  int rejection_recovery_after = 20;  ///< consecutive rejections that start a recovery
   int max_covariance_repairs = 10;    ///< the filter ends if one more repair is needed
   /// A gap longer than this is divided into equal steps of at most this length. The length is
   /// rounded to whole ns and is at least 1 ns.
@@ -63,7 +64,7 @@ inline EkfOptions WithoutRecovery(EkfOptions options) {
 
 }  // namespace internal
 
-/// One measurement of a sensor, or one control input of a state. Argument of Filter::Push.
+/// One measurement of a sensor, or one control input of a state, for Filter::Push.
 struct Reading {
   Reading(int stream_index, std::vector<double> z, std::int64_t landmark_id = -1,
           std::vector<double> r = {}, std::vector<double> known_numbers = {})
@@ -100,20 +101,20 @@ struct Prediction {
 ///   step         propagate the state to the timestamp of the frame, in several steps if a control
 ///                input changes or the gap is longer than max_dt_s
 ///   initialise   initialise the blocks that wait for one of the measurements
-///   predict      compute h, r and S of each measurement in a group at the same state
+///   predict      compute h, r and S of all measurements of a group at the same state
 ///   gate         compare r' S^-1 r of each measurement with a chi-square quantile; compute robust
 ///                weights; reject outliers by RANSAC
 ///   correct      correct the state by one stacked update with the accepted measurements
 ///   recover      repair P if it is not positive semi-definite; reset or inflate blocks if a sensor
-///                was rejected too often in a row
+///                reached the limit of consecutive rejections
 ///   landmarks    count, prune, convert and initialise landmarks
 ///
 /// The control inputs of a frame act from its timestamp on. An update is atomic: if the new state
 /// would not be finite, or P not positive definite, the update is rolled back and reported.
 ///
-/// In live use, Push processes the readings of one timestamp. At returns the estimate at a later
-/// time. Expect returns the predicted measurement of a sensor. At and Expect do not change the
-/// filter.
+/// In live use, Push processes the readings of one timestamp. At returns the predicted state at a
+/// later time. Expect returns the predicted measurement of a sensor. At and Expect do not change
+/// the filter.
 ///
 /// Frames must be ordered by timestamp. A frame older than the state is reported as `stale` and not
 /// used. Use Rollback to process late frames.
@@ -123,7 +124,7 @@ struct Prediction {
 /// models, which never change. Models may be called from several threads.
 class Filter : public Estimator {
  public:
-  // Processing frame by frame (Estimator).
+  // Functions of Estimator, which process frames.
   void Start(Timestamp timestamp) override;
   const UpdateReport& Process(const Frame& frame) override;
   std::unique_ptr<Estimator> Clone() const override { return std::make_unique<Filter>(*this); }
@@ -136,25 +137,24 @@ class Filter : public Estimator {
 
   const Problem& problem() const;
 
-  // Live use: processing of readings, and predictions.
-  /// Returns the index of a stream, the value of Reading::stream. Throws Error kBadConfig if the
-  /// name is unknown.
+  // Functions for live use, which process readings and compute predictions.
+  /// Returns the index of a stream, for Reading::stream. Throws Error kBadConfig if the name is
+  /// unknown.
   int stream(std::string_view name) const;
   /// Returns the id of a block of the problem. The name has the form `owner.block`. Throws Error
   /// kBadConfig if the name is unknown.
   BlockId block(std::string_view name) const;
   /// Converts the readings of one timestamp to a frame. Throws Error kBadData if a stream is
-  /// unknown, or if its measurements need another number of values, covariance elements or known
-  /// numbers. The length of a quaternion or direction may differ from 1 by at most 1e-3.
+  /// unknown, if a reading has a wrong number of values, covariance elements or known numbers, or
+  /// if the length of a quaternion or direction differs from 1 by more than 1e-3.
   Frame MakeFrame(Timestamp timestamp, const std::vector<Reading>& readings) const;
-  /// Calls MakeFrame and Process. The report is valid until the next call. Throws the errors of
-  /// MakeFrame; the filter is then unchanged.
+  /// Calls MakeFrame and Process. The report is valid until the next call. If MakeFrame throws, the
+  /// filter is unchanged.
   const UpdateReport& Push(Timestamp timestamp, const std::vector<Reading>& readings);
   const UpdateReport& Push(Timestamp timestamp, const SensorHandle& sensor, double z) {
     return Push(timestamp, {Reading(sensor, {z})});
   }
-  // Times in seconds are rejected at compile time: TimestampFromSeconds converts them to
-  // nanoseconds.
+  // Times in seconds do not compile. TimestampFromSeconds converts them to nanoseconds.
   template <std::floating_point Seconds, class... Arguments>
   const UpdateReport& Push(Seconds t_s, const Arguments&... arguments) = delete;
   template <std::floating_point Seconds>
@@ -177,8 +177,8 @@ class Filter : public Estimator {
   std::optional<Prediction> Expect(std::string_view sensor, Timestamp timestamp,
                                    std::int64_t landmark = -1,
                                    const std::vector<double>& known = {}) const;
-  /// Returns Expect of each landmark, but propagates the state only once. The sensor model must not
-  /// need known numbers.
+  /// Returns the result of Expect for each landmark, but propagates the state only once. The sensor
+  /// model must not need known numbers.
   std::vector<std::optional<Prediction>> ExpectEach(
       std::string_view sensor, Timestamp timestamp,
       const std::vector<std::int64_t>& landmarks) const;

@@ -16,14 +16,14 @@ Event StaleEvent(const Frame& frame, Timestamp state) {
           "the frame at " + SecondsText(frame.timestamp) + " is older than the state at " +
               SecondsText(state) +
               ": the measurements of this frame are not used; to use late frames, set "
-              "`out_of_sequence: {policy: rollback, ...}` or, in C++, alidade::Rollback"};
+              "`out_of_sequence: {policy: rollback, ...}`, or use alidade::Rollback in C++"};
 }
 
-/// Returns the options. Throws Error kBadConfig if an option is out of range.
+/// Returns `options`. Throws Error kBadConfig if an option is out of range.
 const EkfOptions& CheckedOptions(const EkfOptions& options) {
   ExpectOption(options.gate > 0.0 && options.gate <= 1.0, "gate", options.gate,
                "a probability in (0, 1]; 1 means no gate");
-  ExpectOption(options.max_dt_s > 0.0, "max_dt_s", options.max_dt_s, "seconds > 0");
+  ExpectOption(options.max_dt_s > 0.0, "max_dt_s", options.max_dt_s, "a time > 0 s");
   ExpectOption(options.rejection_recovery_after >= 1, "rejection_recovery_after",
                options.rejection_recovery_after, "at least 1");
   ExpectOption(options.max_covariance_repairs >= 0, "max_covariance_repairs",
@@ -94,7 +94,7 @@ void FilterEngine::Process(const Frame& frame) {
   if (f.health.ended) return;
   for (PendingMeasurement& pending : rows) {
     if (landmarks && pending.binding->model->has_landmark())
-      continue;  // rejected landmarks do not cause a recovery
+      continue;  // rejected measurements of landmarks do not cause a recovery
     if (gate_.Count(f, *pending.report)) recovery_.Recover(f, pending);
   }
   AddElapsedTo(FramePart::kUpdate);
@@ -184,8 +184,8 @@ void FilterEngine::Update(std::vector<PendingMeasurement*>& group) {
   }
 }
 
-/// Predicts all measurements of a group at the current state. Removes those that the gate rejects
-/// from the group.
+/// Predicts all measurements of a group at the current state. Removes measurements from the group
+/// that have no valid prediction or do not pass the gate.
 void FilterEngine::PredictAndGate(std::vector<PendingMeasurement*>& group) {
   int capacity = 0;
   for (PendingMeasurement* const pending : group) {
@@ -209,7 +209,8 @@ void FilterEngine::PredictAndGate(std::vector<PendingMeasurement*>& group) {
   AddElapsedTo(FramePart::kGate);
 }
 
-/// Performs one update. Returns false if the update failed and the state is unchanged.
+/// Performs one update. If `rows` is empty or the update fails, returns false and leaves the state
+/// unchanged.
 bool FilterEngine::Correct(std::span<PendingMeasurement* const> rows) {
   if (rows.empty()) return false;
   gate_.ApplyRobustWeights(rows);
@@ -217,9 +218,9 @@ bool FilterEngine::Correct(std::span<PendingMeasurement* const> rows) {
   AddElapsedTo(FramePart::kUpdate);
   if (outcome == Outcome::kNotPd) {
     AddEvent(f, EventKind::kNotPd,
-             "S or P would not be positive definite; the update was rolled back");
+             "the update was rolled back, because S or P would not be positive definite");
   } else if (outcome == Outcome::kNotFinite) {
-    AddEvent(f, EventKind::kNotFinite, "the update is not finite and was rolled back");
+    AddEvent(f, EventKind::kNotFinite, "the update was rolled back, because it is not finite");
   }
   if (outcome != Outcome::kAccepted) {
     for (const PendingMeasurement* const pending : rows) {
@@ -259,7 +260,7 @@ std::optional<Prediction> FilterEngine::Expect(int sensor, std::int64_t landmark
   method->BeginUpdate(f, m);
   pending.linearised.column = 0;
   const Outcome outcome = gate_.Test(f, pending, method->ComputeNis(f, pending));
-  // kGated is possible: h at the estimate may lie far from the mean of h.
+  // The outcome may be kGated, because h at the estimate may differ much from the mean of h (Ukf).
   if (outcome != Outcome::kAccepted && outcome != Outcome::kGated) return std::nullopt;
   return Prediction{{pending.report->h.begin(), pending.report->h.end()},
                     Eigen::Map<const RowMajor>(pending.s, m, m)};

@@ -19,7 +19,7 @@
 
 namespace alidade::internal {
 
-/// Throws Error kBadConfig with the option, its value and `expected`, unless `in_range` is true.
+/// If `in_range` is false, throws Error kBadConfig with the option, its value and `expected`.
 void ExpectOption(bool in_range, const char* option, double value, const char* expected);
 
 /// Implementation of every recursive filter. Processes a frame in these stages, with these
@@ -28,17 +28,17 @@ void ExpectOption(bool in_range, const char* option, double value, const char* e
 ///   step         StepTo            Timeline::NextSubStep, UpdateMethod::Step
 ///   collect                        PendingMeasurements::Collect of all measurements and sensors
 ///   initialise                     InitialiseWaiting, LandmarkMap::Attach
-///   group        UpdateInGroups    Update of each group that `fuse` defines, which consists of:
+///   group        UpdateInGroups    Update of each group that `fuse` defines, in three stages:
 ///   predict      PredictAndGate    UpdateMethod::Predict of each measurement
-///   gate                           UpdateMethod::ComputeNis and Gate::Test of each;
+///   gate                           UpdateMethod::ComputeNis and Gate::Test of each measurement;
 ///                                  Consensus::Split
 ///   correct      Correct           Gate::ApplyRobustWeights, UpdateMethod::Correct
 ///   recover                        Recovery::RepairCovariance; Gate::Count, Recovery::Recover
 ///   landmarks                      LandmarkMap::Maintain
 ///   inputs                         Timeline::TakeInputs, which act from the frame's timestamp on
 ///
-/// The members do not point to each other, only to the problem index, which all copies share. A
-/// copy is therefore an independent filter.
+/// The members do not point to each other. They point only to the problem index, which all copies
+/// share. A copy is therefore an independent filter.
 class FilterEngine {
  public:
   FilterEngine(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams,
@@ -74,7 +74,7 @@ class FilterEngine {
   Gate gate_;
   Consensus consensus_;
   Recovery recovery_;
-  bool stale_reported_ = false;                       ///< whether the last frame was stale
+  bool stale_reported_ = false;                       ///< whether the previous frame was stale
   std::chrono::steady_clock::time_point part_start_;  ///< start of the current FramePart
   Scratch<PendingMeasurements> rows_;
   Scratch<Groups> groups_;

@@ -15,11 +15,11 @@
 
 namespace alidade::internal {
 
-/// Health of a filter. Also records which problems were already reported, because each is reported
-/// once.
+/// Health of a filter. Also records which faults were already reported, because a fault is not
+/// reported repeatedly.
 struct Health {
-  /// By sensor: whether h was not defined, or blocks were inflated, since its last accepted
-  /// measurement.
+  /// By sensor: whether h was not defined (out_of_domain), or whether blocks were inflated
+  /// (inflated), since the last accepted measurement of the sensor.
   std::vector<char> out_of_domain, inflated;
   bool diverged = false, ended = false;
   /// Last measurement that an update used.
@@ -30,15 +30,15 @@ struct Health {
   } last_used;
 };
 
-/// State shared by the parts of a filter: x and P, the time, the motion models, the report. Only an
-/// UpdateMethod changes P of blocks that have a value, because an UpdateMethod may store a root of
-/// P. Functions that are exceptions to this rule document it. A copy is a snapshot.
+/// State shared by the parts of a filter: x and P, the time, the motion models and the report. An
+/// UpdateMethod may store a root of P. Therefore only an UpdateMethod may change P of blocks that
+/// have a value. The comments of other functions that change P state this. A copy is a snapshot.
 struct FilterState {
   FilterState(std::shared_ptr<const ProblemIndex> index, bool uses_first_estimates);
 
   int size() const { return state.covariance().size(); }  ///< n
-  /// Updates the members that depend on which blocks have a value. Must be called after a block was
-  /// initialised or reset.
+  /// Updates the members that depend on the set of blocks with a value. Must be called after a
+  /// block was initialised or reset.
   void Activate();
   /// Returns whether first_estimates are used (JacobianPolicy::kFirstEstimate).
   bool uses_first_estimates() const { return uses_first_estimates_; }
@@ -60,7 +60,7 @@ struct FilterState {
   } blocks;
   /// Memory for temporary matrices. A function that uses it must create a Workspace::Use.
   Scratch<Workspace> work;
-  Scratch<std::vector<double>> moved;  ///< the corrected x, before the update is committed
+  Scratch<std::vector<double>> moved;  ///< corrected x, before it replaces the state
   Scratch<KalmanUpdate> update;        ///< last update of a method that computes Jacobians
 
  private:
@@ -73,7 +73,7 @@ struct FilterState {
 Event& AddEvent(FilterState& f, EventKind kind, std::string text);
 /// Appends an event and marks the filter as diverged.
 void AddDivergenceEvent(FilterState& f, EventKind kind, std::string text);
-/// Returns the text `block = value, ...` of the blocks that have a value.
+/// Returns the text `block = value, ...`. Omits blocks without a value.
 std::string Describe(const State& state, std::span<const BlockId> blocks);
 /// Ends the filter. Appends an event with the reason, the last valid state and the last used
 /// measurement.

@@ -12,8 +12,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns whether the outcome of a measurement counts as a rejection. Measurements that are not
-/// finite do not count, because h was not computed for them.
+/// Returns whether the outcome of a measurement counts as a rejection. A measurement z that is not
+/// finite does not count. Its h is empty, because no model was called.
 bool IsRejected(const MeasurementReport& entry) {
   return InfoOf(entry.outcome).is_rejection &&
          (entry.outcome != Outcome::kNotFinite || !entry.h.empty());
@@ -86,7 +86,7 @@ void Gate::ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const {
   }
 }
 
-/// Counts a measurement that was not accepted. Returns whether the filter has to recover (Count).
+/// Counts a measurement that was not accepted. Returns the result of Count.
 [[gnu::noinline]] bool Gate::CountRejection(const MeasurementReport& entry) {
   if (max_rejections_ == 0 || !IsRejected(entry)) return false;
   int& count = rejections_[static_cast<std::size_t>(entry.sensor)];
@@ -95,14 +95,14 @@ void Gate::ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const {
   return true;
 }
 
-/// Reports that the noise is negligible compared with H P H', once for each sensor.
+/// Reports once for each sensor that its noise is negligible compared with H P H'.
 [[gnu::noinline]] void Gate::WarnOfConditioning(FilterState& f, const PendingMeasurement& pending,
                                                 std::size_t i) {
   const auto sensor = static_cast<std::size_t>(pending.sensor);
   if (is_warned_[sensor]) return;
   is_warned_[sensor] = true;
   AddEvent(f, EventKind::kConditioning,
-           "sensor '" + pending.binding->name + "': noise variance " +
+           "sensor '" + pending.binding->name + "': the noise variance " +
                RoundedText(pending.R[i], 3) + " is negligible compared with H P H' = " +
                RoundedText(pending.s[i] - pending.R[i], 3) + "; S is badly conditioned");
 }

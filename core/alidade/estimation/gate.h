@@ -23,11 +23,11 @@ class Gate {
     return nis <= thresholds_[static_cast<std::size_t>(pending.sensor)] ? Accept(f, pending, nis)
                                                                         : Reject(f, pending, nis);
   }
-  /// Replaces R by R / w in the stored R and S of measurements that passed the gate.
+  /// Replaces R by R / w in the measurements `rows`, and corrects their S accordingly.
   void ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const;
 
   /// Counts the outcome of a measurement. Returns true if the consecutive rejections of its sensor
-  /// reached the limit: the filter has to recover, and the count restarts at zero.
+  /// reached the limit, so that the filter has to recover. The count then restarts at zero.
   bool Count(FilterState& f, const MeasurementReport& entry) {
     if (entry.outcome != Outcome::kAccepted && entry.outcome != Outcome::kInitialised) {
       return CountRejection(entry);
@@ -61,7 +61,7 @@ class Gate {
   void WarnOfConditioning(FilterState& f, const PendingMeasurement& pending, std::size_t i);
   bool CountRejection(const MeasurementReport& entry);
 
-  bool has_gate_;                   ///< if false, an infinite NIS passes too
+  bool has_gate_;                   ///< if false, an infinite NIS is also accepted
   std::vector<double> thresholds_;  ///< by sensor: largest accepted r' S^-1 r; finite
   bool has_robust_loss_ = false;    ///< whether any sensor has a robust loss
   std::vector<bool> is_warned_;     ///< by sensor: whether bad conditioning was reported

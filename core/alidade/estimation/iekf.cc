@@ -52,7 +52,7 @@ class IekfEquations : public UpdateMethod {
     std::optional<double> step = std::nullopt;
     bool converged = false;
   };
-  /// An iterate dx = P v, and the step from this iterate to the next, step = P step_v.
+  /// An iterate, dx = P v, and the step from this iterate to the next one, step = P step_v.
   struct IterateStep {
     const Workspace::Vector &dx, &v, &step, &step_v;
   };
@@ -98,10 +98,10 @@ Outcome IekfEquations::Correct(FilterState& f, std::span<PendingMeasurement* con
   return outcome;
 }
 
-/// Computes the minimum of one update, or the last iterate if there is no convergence. Leaves the
-/// measurements linearised at the last iterate at which this is possible. P may be singular: dx = P
-/// v for all iterates, so dx' P^-1 dx = v' dx. If the first step is not possible, returns nullopt
-/// and leaves the measurements unchanged.
+/// Computes the minimum of the cost of one update. If the iteration does not converge, returns the
+/// last iterate. On return, the measurements are linearised at the last iterate at which all of
+/// them can be linearised. P may be singular, because dx = P v for all iterates, so dx' P^-1 dx =
+/// v' dx. If the first step is not possible, returns nullopt and leaves the measurements unchanged.
 std::optional<IekfEquations::Minimum> IekfEquations::Minimise(
     FilterState& f, std::span<PendingMeasurement* const> rows) {
   const Eigen::Index n = f.size(), m = TotalDof(rows);
@@ -233,11 +233,12 @@ Iekf::Iekf(Problem problem, const IekfOptions& options, const std::vector<Stream
              std::make_unique<internal::IekfEquations>(options.max_iterations, options.tolerance)) {
   if (options.jacobian != JacobianPolicy::kLatest) {
     throw Error(ExitCode::kBadConfig,
-                "option jacobian is JacobianPolicy::kFirstEstimate; expected kLatest, or an Ekf");
+                "option jacobian is JacobianPolicy::kFirstEstimate; expected kLatest; or use an "
+                "Ekf");
   }
   internal::ExpectOption(options.max_iterations > 1, "max_iterations", options.max_iterations,
                          "at least 2");
-  internal::ExpectOption(options.tolerance > 0.0, "tolerance", options.tolerance, "> 0");
+  internal::ExpectOption(options.tolerance > 0.0, "tolerance", options.tolerance, "a number > 0");
 }
 
 }  // namespace alidade

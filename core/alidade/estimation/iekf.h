@@ -11,8 +11,8 @@ namespace alidade {
 /// Options of Iekf.
 struct IekfOptions : EkfOptions {
   int max_iterations = 10;  ///< maximum number of linearisations of an update; at least 2
-  /// An update has converged if its next step is at most this multiple of the posterior standard
-  /// deviation; > 0.
+  /// An update has converged if the next step is at most this multiple of the posterior standard
+  /// deviation. Must be > 0.
   double tolerance = 1e-4;
 };
 
@@ -25,10 +25,10 @@ struct IekfOptions : EkfOptions {
 ///
 ///   dx+ = K (r + H dx),   K = P H' S^-1,   S = H P H' + R
 ///
-/// It halves the step dx+ - dx as long as the step would increase c or h is not defined at its end.
-/// R is evaluated at the iterate and is constant during a step. The new covariance is P - K S K' at
-/// the last linearisation. The gate, the robust weight, and the reported h, S and NIS are computed
-/// at the prediction.
+/// The step dx+ - dx is halved as long as it would increase c, or h is not defined at its end. R is
+/// evaluated at the iterate and is constant during a step. The new covariance is P - K S K' at the
+/// last linearisation. The gate, the robust weight, and the reported h, S and NIS are computed at
+/// the prediction.
 ///
 /// If an update does not converge, or reaches a point at which h has no Jacobian, the last iterate
 /// is used (event `not_converged`). If R is not positive definite, c is not defined, and the update

@@ -57,7 +57,8 @@ double LinearityIndexOf(const State& state, const LandmarkRecord& landmark, cons
                      InverseDistanceSigma(state, landmark), camera);
 }
 
-/// Returns J P J'. The columns of J belong to the blocks of a landmark.
+/// Returns J P J', the covariance of the position of a landmark. The columns of J belong to the
+/// blocks of the landmark.
 Eigen::Matrix3d CovarianceOf(const State& state, const LandmarkRecord& landmark,
                              const LandmarkPoint& point) {
   constexpr int kMaxRows = 6;
@@ -219,7 +220,7 @@ void LandmarkMap::Attach(const FilterState& f, PendingMeasurement& pending,
   InitialiseNew(f, rows);
 }
 
-/// Counts the observations of each landmark, and how many of them were accepted.
+/// Counts the observations, the tried measurements and the accepted measurements of each landmark.
 void LandmarkMap::Count(FilterState& f, std::span<PendingMeasurement> rows) {
   for (const PendingMeasurement& pending : rows) {
     if (!IsOfLandmark(pending) ||
@@ -237,8 +238,8 @@ void LandmarkMap::Count(FilterState& f, std::span<PendingMeasurement> rows) {
   }
 }
 
-/// Returns the record of a landmark, and creates it if necessary. A new record reuses the memory of
-/// a deleted one.
+/// Returns the record of a landmark. Creates the record if it does not exist. A new record reuses
+/// the memory of a deleted record.
 LandmarkRecord& LandmarkMap::RecordOf(std::int64_t id) {
   const auto entry = landmarks_.lower_bound(id);
   if (entry != landmarks_.end() && entry->first == id) return entry->second;
@@ -258,7 +259,7 @@ LandmarkRecord& LandmarkMap::RecordOf(std::int64_t id) {
 }
 
 /// Counts landmarks whose inverse distance is at or below zero after an update. With
-/// `negative_depth: delete`, also deletes them.
+/// `negative_depth: delete`, also deletes these landmarks.
 void LandmarkMap::CheckDepths(FilterState& f) {
   DeleteIf(f, [&](LandmarkRecord& landmark) {
     return IsNegative(f, landmark) &&
@@ -267,7 +268,7 @@ void LandmarkMap::CheckDepths(FilterState& f) {
 }
 
 /// Returns whether the inverse distance of a landmark is at or below zero. Counts the landmark if
-/// it was above zero before.
+/// the inverse distance was above zero before.
 bool LandmarkMap::IsNegative(FilterState& f, LandmarkRecord& landmark) {
   const bool is_negative =
       HasInverseDistance(landmark) && !(InverseDistance(f.state, landmark) > 0.0);
@@ -290,8 +291,8 @@ bool LandmarkMap::HasLowMatchRatio(const LandmarkRecord& landmark) const {
          landmark.accepted < options_.min_match_ratio * landmark.tried;
 }
 
-/// Returns the frame in which a landmark will be deleted if no frame before it measures the
-/// landmark.
+/// Returns the number of the frame in which a landmark will be deleted, unless an earlier frame
+/// measures the landmark.
 std::int64_t LandmarkMap::PruneFrameOf(const LandmarkRecord& landmark) const {
   const int max_frames = landmark.in_state() ? options_.max_missed_frames : kMaxCandidateFrames;
   return max_frames > 0 ? landmark.last_frame + max_frames
@@ -335,7 +336,7 @@ void LandmarkMap::DropBlocks(FilterState& f, LandmarkRecord& landmark) {
   landmark.blocks.clear();
 }
 
-/// Converts landmarks to xyz if the frame measures them and their linearity index is low enough.
+/// Converts a landmark to xyz if the frame measures it and its linearity index is below the limit.
 void LandmarkMap::Convert(FilterState& f, std::span<PendingMeasurement> rows) {
   if (!(options_.max_linearity_index > 0.0)) return;
   for (const PendingMeasurement& pending : rows) {
@@ -364,8 +365,8 @@ bool LandmarkMap::ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& 
   return true;
 }
 
-/// Initialises candidates that the frame measures, until the frame measures max_per_frame landmarks
-/// in the state.
+/// Initialises candidates that the frame measures. Stops when the frame measures max_per_frame
+/// landmarks of the state.
 void LandmarkMap::InitialiseNew(FilterState& f, std::span<PendingMeasurement> rows) {
   FindMeasured(rows);
   auto count = std::ssize(measured_);
@@ -386,8 +387,8 @@ void LandmarkMap::InitialiseNew(FilterState& f, std::span<PendingMeasurement> ro
   }
 }
 
-/// Returns the candidate that the measurement can initialise, or the end of the map if there is
-/// none.
+/// Returns the candidate that the measurement can initialise. If the measurement cannot initialise
+/// a candidate, returns the end of the map.
 LandmarkMap::ById::iterator LandmarkMap::FindCandidate(const FilterState& f,
                                                        const PendingMeasurement& pending) {
   if (!IsOfLandmark(pending) || pending.report->outcome != Outcome::kNotReady ||
@@ -404,8 +405,8 @@ LandmarkMap::ById::iterator LandmarkMap::FindCandidate(const FilterState& f,
   return is_candidate ? found : landmarks_.end();
 }
 
-/// Reserves memory for the landmarks that the frame may initialise, at most `max_count`. This
-/// matters in the first frame, which initialises many landmarks.
+/// Reserves memory for the landmarks that the frame may initialise, at most `max_count`. This saves
+/// time in the first frame, which initialises many landmarks.
 void LandmarkMap::Reserve(FilterState& f, std::span<const PendingMeasurement> rows,
                           std::ptrdiff_t max_count) {
   int size = 0;
@@ -440,8 +441,8 @@ void LandmarkMap::FindMeasured(std::span<PendingMeasurement> rows) {
 /// Returns the median inverse distance of the measured landmarks that have converged. If fewer than
 /// adapt_after have converged, returns the inverse distance of the prior.
 double LandmarkMap::PriorInverseDistance(const State& state) {
-  constexpr double kConverged =
-      0.1;  // largest linearity index, if landmarks are not converted to xyz
+  // Limit of the linearity index of a converged landmark, if landmarks are not converted to xyz.
+  constexpr double kConverged = 0.1;
   const double limit =
       options_.max_linearity_index > 0.0 ? options_.max_linearity_index : kConverged;
   inverse_distances_.clear();

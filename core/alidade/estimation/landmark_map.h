@@ -12,8 +12,8 @@
 
 namespace alidade::internal {
 
-/// Counts how many landmarks with each id were deleted. Remembers at least the last 50 000
-/// deletions; older ids may be forgotten.
+/// Counter of the deleted landmarks of each id. The counts cover at least the last 50 000
+/// deletions. The count of an id whose last deletion is older may be discarded.
 class LandmarkIdReuse {
  public:
   /// Returns the number of deleted landmarks with this id.
@@ -40,7 +40,7 @@ struct LandmarkRecord {
   std::int64_t last_frame = 0;  ///< last frame that measured the landmark
   Timestamp first = kNoTimestamp, last = kNoTimestamp;
   bool is_negative = false;  ///< whether the inverse distance is at or below zero
-  bool is_known = false;     ///< whether the config defines the landmark; never pruned
+  bool is_known = false;     ///< whether the landmark is known before the run; never pruned
   bool in_state() const { return !blocks.empty(); }
 };
 
@@ -51,12 +51,14 @@ class LandmarkMap {
   /// Requires that the problem of `index` has landmarks.
   explicit LandmarkMap(const ProblemIndex& index);
 
-  /// Adds the known landmarks to the state. Called once.
+  /// Adds the known landmarks to the state. Must be called once, before the first frame.
   void AddKnown(FilterState& f);
   /// Binds the measurements whose landmark is in the state to the blocks of the landmark. The
-  /// outcome of all other measurements of landmarks is kNotReady.
+  /// outcome of other measurements of landmarks becomes kNotReady, or kInvalid if the landmark id
+  /// is negative.
   void Attach(FilterState& f, std::span<PendingMeasurement> rows);
-  /// Counts, prunes, converts and initialises landmarks. Called after the updates of a frame.
+  /// Counts, prunes, converts and initialises landmarks. Must be called after the updates of a
+  /// frame.
   void Maintain(FilterState& f, std::span<PendingMeasurement> rows);
 
   std::vector<LandmarkEstimate> Estimates(const State& state) const;
@@ -67,8 +69,8 @@ class LandmarkMap {
   using ById = std::map<std::int64_t, LandmarkRecord>;
   /// Landmark roles of a sensor.
   struct LandmarkSensorInfo {
-    /// First landmark role. The roles of a landmark come last. -1: the sensor does not measure
-    /// landmarks.
+    /// Index of the first landmark role. The roles of a landmark come last. -1: the sensor does not
+    /// measure landmarks.
     int first = -1;
     int position = -1;  ///< index of the role `position`: the camera position in the world
     std::optional<LandmarkRepresentation> representation;
@@ -123,13 +125,14 @@ class LandmarkMap {
   // Reused memory.
   Scratch<std::vector<ById::node_type>> recycled_nodes_;  ///< records of deleted landmarks
   std::string name_;                                      ///< name of the declared block
-  Scratch<std::vector<const PendingMeasurement*>>
-      measured_;  ///< one accepted measurement of each landmark in the state, sorted by id
+  /// The first accepted measurement of each landmark in the state, sorted by landmark id.
+  Scratch<std::vector<const PendingMeasurement*>> measured_;
+  /// Blocks that a new landmark creates, without existing shared blocks.
   struct {
     std::vector<BlockId> blocks;
     std::vector<double> values;
     std::vector<int> rows;  ///< rows of the inverse measurement
-  } new_blocks_;            ///< blocks of a new landmark, without those that exist already
+  } new_blocks_;
   std::vector<double> inverse_distances_;  ///< inverse distances of converged landmarks
 };
 

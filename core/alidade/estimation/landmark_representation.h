@@ -10,7 +10,7 @@
 /// Functions that select a representation of alidade/model/landmark.h at run time.
 namespace alidade {
 
-enum class LandmarkRepresentation;  // in alidade/model/landmark.h
+enum class LandmarkRepresentation;  // defined in alidade/model/landmark.h
 
 /// Returns the name of a representation in the key `landmarks.representation`: `inverse_depth`,
 /// `anchored` or `xyz`.
@@ -24,14 +24,14 @@ std::optional<LandmarkRepresentation> RepresentationOf(const std::vector<Space>&
 
 namespace internal {
 
-/// The largest number of tangent elements of a representation.
+/// Largest number of tangent elements of a representation.
 inline constexpr int kMaxLandmarkTangent = 6;
 
 /// Position of a landmark, and the Jacobian of the position.
 struct LandmarkPoint {
   Eigen::Vector3d position;  ///< in the world, m
-  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, kMaxLandmarkTangent>
-      jacobian;  ///< derivative by the tangent elements of all blocks
+  /// Derivative of the position with respect to the tangent elements of all blocks.
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, kMaxLandmarkTangent> jacobian;
 };
 
 /// Computes the position of a landmark from the values of its blocks, which are in the order of the

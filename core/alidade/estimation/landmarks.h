@@ -16,26 +16,25 @@
 /// Landmarks: state blocks that are added and removed during a run.
 namespace alidade {
 
-/// Landmark with a position in the world, in m, that is known before the run. The representation is
-/// xyz.
+/// Landmark whose position in the world, in m, is known before the run. The representation is xyz.
 struct KnownLandmark {
   std::int64_t id = 0;
   std::array<double, 3> position{};
-  double sigma = 0.0;  ///< of each element, m; 0: known exactly, never corrected
+  double sigma = 0.0;  ///< standard deviation of each element, m; 0: exact, never corrected
 };
 
 /// Options for the initialisation, conversion and pruning of landmarks.
 struct LandmarkOptions {
-  /// Prior inverse distance, which one observation does not determine, and its standard deviation,
-  /// both in 1/m. Both depend on the scene and have no default.
+  /// Prior of the inverse distance of a landmark, in 1/m. One observation does not determine the
+  /// inverse distance. The mean and standard deviation depend on the scene and have no default.
   struct Prior {
     double inverse_distance = std::numeric_limits<double>::quiet_NaN();
     double sigma = std::numeric_limits<double>::quiet_NaN();
     /// If a frame measures at least this number of converged landmarks, their median inverse
     /// distance replaces `inverse_distance`. 0: never.
     int adapt_after = 0;
-    /// Replaces LandmarkOptions::min_observations for landmarks that need this prior. 0: does not
-    /// replace it.
+    /// Replaces LandmarkOptions::min_observations for landmarks that need this prior. 0: no
+    /// replacement.
     int min_observations = 0;
   };
   enum class NegativeDepth { kKeep, kDelete };
@@ -43,14 +42,16 @@ struct LandmarkOptions {
   static constexpr int kUnlimited = std::numeric_limits<int>::max();
 
   std::optional<Prior> prior;
-  /// A frame initialises a new landmark only if it measures fewer landmarks of the state than this.
+  /// A frame does not initialise further landmarks if it measures this number of landmarks that are
+  /// in the state.
   int max_per_frame = kUnlimited;
-  /// Number of the observation that initialises a landmark. 1: the first one.
+  /// Number of observations that a landmark needs for its initialisation. 1: the first observation
+  /// initialises the landmark.
   int min_observations = 1;
   /// A landmark is deleted after this number of frames without an observation. 0: never.
   int max_missed_frames = 0;
-  /// A landmark is deleted if less than this fraction of its measurements was accepted, out of at
-  /// least `min_attempts` measurements.
+  /// A landmark with at least `min_attempts` measurements is deleted if less than this fraction of
+  /// its measurements was accepted.
   double min_match_ratio = 0.0;
   int min_attempts = 10;
   /// A landmark is converted to xyz if its linearity index [Civera2008] is below this; 0: never.
@@ -80,14 +81,14 @@ struct LandmarkEstimate {
   int generation = 0;  ///< number of earlier landmarks with this id
   std::optional<LandmarkRepresentation> representation;
   Eigen::Vector3d position = Eigen::Vector3d::Constant(std::nan(""));  ///< in the world, m
-  Eigen::Vector3d true_position =
-      Eigen::Vector3d::Constant(std::nan(""));  ///< in the world, m; NaN: unknown
+  /// True position in the world, m; NaN: unknown.
+  Eigen::Vector3d true_position = Eigen::Vector3d::Constant(std::nan(""));
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Constant(std::nan(""));
   double inverse_distance = std::nan("");  ///< 1/m; NaN for xyz
   double sigma = std::nan("");             ///< standard deviation of the inverse distance, 1/m
   Timestamp first = kNoTimestamp, last = kNoTimestamp;
-  Timestamp removed =
-      kNoTimestamp;             ///< time of removal; kNoTimestamp: the landmark is in the state
+  /// Time of the removal. kNoTimestamp: the landmark is in the state.
+  Timestamp removed = kNoTimestamp;
   int tried = 0, accepted = 0;  ///< number of all measurements, and of accepted measurements
 };
 

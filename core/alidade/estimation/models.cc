@@ -32,20 +32,20 @@ std::string internal::CheckOwned(const Geometry& geometry, OwnedRole& owned) {
   };
   if (!has_size(owned.mean, geometry.ambient) || !has_size(owned.sqrt_prior, n * n) ||
       !has_size(owned.sqrt_density, n * n)) {
-    return "do not have the size of the role";
+    return "do not have the size of the role; expected one element for each element of the role";
   }
   if (owned.mean.empty()) owned.mean = geometry.Identity();
   if (!AllFinite(owned.mean) || !AllFinite(owned.sqrt_prior) || !AllFinite(owned.sqrt_density) ||
       !std::isfinite(owned.time_constant_s)) {
-    return "are not finite";
+    return "are not finite; expected finite numbers";
   }
   if (DistanceFrom(geometry, owned.mean.data()) > kUnitTolerance) {
-    return "have a mean whose length is not 1";
+    return "have a mean whose length is not 1; expected a mean of unit length";
   }
   geometry.Normalise(owned.mean.data());
   if (owned.dynamics != OwnedDynamics::kGaussMarkov) owned.time_constant_s = 0.0;
   if (owned.dynamics == OwnedDynamics::kGaussMarkov && !(owned.time_constant_s > 0.0)) {
-    return "have a time constant of 0 s or less";
+    return "have a time constant of 0 s or less; expected a time constant > 0 s";
   }
   return {};
 }
@@ -56,7 +56,7 @@ Status internal::RecordModelError(const void* model, const std::string& text) no
     std::erase_if(model_errors, [&](const ModelError& error) { return error.model == model; });
     if (model_errors.size() == kMaxErrors) model_errors.erase(model_errors.begin());
     model_errors.push_back({model, text});
-  } catch (const std::bad_alloc&) {  // the error text then remains empty
+  } catch (const std::bad_alloc&) {  // the error text is then empty
   }
   return Status::kError;
 }

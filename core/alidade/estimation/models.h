@@ -13,8 +13,8 @@
 #include "alidade/model/status.h"
 #include "alidade/state/manifold.h"
 
-/// Interfaces through which estimators call sensor and motion models. A struct (direct_models.h) or
-/// a plugin implements an interface.
+/// Interfaces through which estimators call sensor and motion models. Model structs
+/// (direct_models.h) and plugins implement these interfaces.
 namespace alidade {
 
 /// Maximum number of roles of a sensor, and of blocks of a motion model.
@@ -30,14 +30,14 @@ enum class OwnedDynamics : std::uint32_t {
 /// Prior and dynamics of a role that is a model parameter state. n: tangent size of the role.
 struct OwnedRole {
   std::vector<double> mean;  ///< ambient
-  std::vector<double>
-      sqrt_prior;  ///< L of the prior P = L L', n x n row-major; empty: known exactly
+  /// L of the prior P = L L', n x n row-major. Empty: the value is known exactly.
+  std::vector<double> sqrt_prior;
   OwnedDynamics dynamics = OwnedDynamics::kConstant;
   std::vector<double> sqrt_density;  ///< L of the driving noise density, per sqrt(s); empty: zero
   double time_constant_s = 0.0;      ///< time constant of a Gauss-Markov process
 };
 
-/// Inverse measurement model of a sensor: the output of SensorModel::Initialise.
+/// Roles that the inverse measurement model of a sensor determines (SensorModel::Initialise).
 struct InverseModel {
   int role = -1;       ///< first role that the model determines; -1: no inverse model
   int count = 0;       ///< number of roles from `role` on: all roles of a landmark, or one
@@ -47,12 +47,12 @@ struct InverseModel {
 /// Measurement that is the input of a sensor model.
 struct Observation {
   const double* z = nullptr;  ///< ambient; null for a prediction
-  const double* known =
-      nullptr;  ///< known numbers of the measurement; may be null if known_size() is 0
+  /// Known numbers of the measurement. May be null if known_size() is 0.
+  const double* known = nullptr;
 };
 
-/// Sensor model z = h(roles) + n, n ~ N(0, L L'). m: tangent size of the measurement. All members
-/// are const. They are thread-safe if those of the derived class are.
+/// Sensor model z = h(roles) + n, n ~ N(0, L L'). m: tangent size of the measurement. All member
+/// functions are const. They are thread-safe if the functions of the derived class are thread-safe.
 class SensorModel {
  public:
   struct Description {
@@ -62,8 +62,8 @@ class SensorModel {
     Space measurement;
     Space known = {};  ///< known numbers of each measurement; not used if the name is empty
     InverseModel inverse = {};
-    std::map<std::size_t, OwnedRole> owned =
-        {};                     ///< by role: prior and dynamics, if the model defines them
+    /// By role: prior and dynamics, if the model defines them.
+    std::map<std::size_t, OwnedRole> owned = {};
     bool has_validity = false;  ///< whether Valid may reject a measurement
     /// L of R = L L', m x m row-major, which replaces the L of the model. Empty: the L of the model
     /// is used.
@@ -96,11 +96,10 @@ class SensorModel {
   const Space& known() const { return description_.known; }
   int known_size() const { return known_size_; }
   const InverseModel& inverse() const { return description_.inverse; }
-  /// Returns whether the sensor measures landmarks: some of its roles then belong to the measured
-  /// landmark.
+  /// Returns whether the sensor measures landmarks, so that some of its roles belong to a landmark.
   bool has_landmark() const;
-  /// Returns prior and dynamics of a role with the flag ALIDADE_ROLE_OWNED. If the model does not
-  /// define them, returns a constant at the neutral element.
+  /// Returns the prior and dynamics of a role with the flag ALIDADE_ROLE_OWNED. If the model does
+  /// not define them, returns an exactly known constant at the neutral element.
   OwnedRole owned(std::size_t role) const;
 
   /// Computes h, its Jacobians and L at the values of the roles. Returns kOutOfDomain if h is not
@@ -131,9 +130,9 @@ class SensorModel {
   Status Valid(const Observation& observation) const {
     return description_.has_validity ? DoValid(observation) : Status::kOk;
   }
-  /// Computes y = g(other roles, z, prior): the values of the initialised roles, one after the
-  /// other. Returns kInvalid if a required prior is missing. ContractViolation if the sensor has no
-  /// inverse model.
+  /// Computes y = g(other roles, z, prior), the concatenated values of the initialised roles.
+  /// Returns kInvalid if a required prior is missing. ContractViolation if the sensor does not have
+  /// an inverse model.
   Status Initialise(const double* const* roles, const Observation& observation, const double* prior,
                     InverseOutput out) const;
   /// Returns the reason why the last call in this thread returned kError.
@@ -174,7 +173,7 @@ class MotionModel {
   };
   /// Destinations of a step. A quantity is not computed if its pointer is null.
   struct Output {
-    double* const* next = nullptr;  ///< x', by block
+    double* const* next = nullptr;  ///< by block: x'
     double* f = nullptr;            ///< F = dx' / dx, n x n row-major; computed only with g
     double* g = nullptr;            ///< G = dx' / dw, n x n_w row-major
     double* sqrt_q = nullptr;       ///< L, n_w x n_w row-major
@@ -194,8 +193,8 @@ class MotionModel {
   bool has_input() const { return !description_.input.name.empty(); }
   const Space& input() const { return description_.input; }
 
-  /// Computes x', its Jacobians and L for the control input u and the noise w. A null w means w =
-  /// 0.
+  /// Computes x', its Jacobians and L for the control input u and the noise w. A null pointer w
+  /// means that w is 0.
   Status Step(const double* const* blocks, const double* input, const double* w, double dt_s,
               const Output& out) const {
     if (w == nullptr) w = zero_noise_.data();
@@ -229,8 +228,8 @@ using SharedMotion = std::shared_ptr<const MotionModel>;
 
 namespace internal {
 
-/// Checks prior and dynamics of a role with this geometry. Returns the defect, or "" if there is
-/// none. Sets a missing mean to the neutral element, and normalises a given mean.
+/// Checks the prior and dynamics of a role with this geometry. Returns the defect, or "" if they
+/// are valid. Sets a missing mean to the neutral element, and normalises a given mean.
 std::string CheckOwned(const Geometry& geometry, OwnedRole& owned);
 
 /// Records `text` as the last error text of a model in this thread, and returns kError.

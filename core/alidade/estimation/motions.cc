@@ -21,7 +21,7 @@ void SpreadNoise(const double* g, const double* l, int n, int w, double* gl) {
   }
 }
 
-/// Does the same as StepAt, but checks only x' for finite values.
+/// Computes the same as StepAt, but does not check whether F, G and L are finite.
 [[gnu::always_inline]] inline Outcome CallStep(const MotionBinding& motion,
                                                const MotionPlace& place, const double* x,
                                                const double* u, const double* w, double dt_s,
@@ -63,14 +63,15 @@ Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const doub
 
 [[gnu::noinline]] StepError StepErrorOf(const MotionBinding& motion, Outcome outcome) {
   if (outcome == Outcome::kAccepted) return {};
-  const std::string model = "motion model of '" + motion.name + "' ";
+  const std::string model = "the motion model of '" + motion.name + "' ";
   if (outcome == Outcome::kNotFinite) {
     return {EventKind::kNotFinite, model + "predicts a state that is not finite"};
   }
   const bool failed = outcome == Outcome::kFailed;
-  return {failed ? EventKind::kPluginFailed : EventKind::kDiverged,
-          model + "cannot predict the state: " +
-              (failed ? motion.model->error_text() : "the state is out of domain")};
+  return {
+      failed ? EventKind::kPluginFailed : EventKind::kDiverged,
+      model + "cannot predict the state: " +
+          (failed ? motion.model->error_text() : "the state is outside the domain of the model")};
 }
 
 Motions::Motions(const ProblemIndex& index)
@@ -82,7 +83,7 @@ Motions::Motions(const ProblemIndex& index)
     const auto n = static_cast<std::size_t>(model.tangent_size());
     const auto n_w = static_cast<std::size_t>(model.noise_size());
     Step& step = steps_[i];
-    step.f.resize(n * n, kNotANumber);  // shows whether the model writes all elements
+    step.f.resize(n * n, kNotANumber);  // NaN reveals elements that the model does not write
     step.g.resize(n * n_w, kNotANumber);
     step.l.resize(n_w * n_w, kNotANumber);
     step.gl.resize(n * n_w);
@@ -123,7 +124,7 @@ StepError Motions::EvaluateModel(std::size_t i, const State& state, double dt_s,
     output.g = step.g.data();
   }
   if (!continues_interval) output.l = step.l.data();
-  // Apply checks that F, G and L are finite: if not, P is not finite either.
+  // Apply detects that F, G or L is not finite, because P is then not finite either.
   const double* const x = state.values().data();
   const Outcome outcome = derivatives
                               ? CallStep(motion, place, x, step.u.data(), nullptr, dt_s, output)
@@ -160,7 +161,7 @@ StepError Motions::EvaluateModel(std::size_t i, const State& state, double dt_s,
 
 StepError Motions::Apply(State& state) {
   Covariance& p = state.covariance();
-  if (active_.size() <= 1) {  // if the propagation of a single model fails, P is unchanged
+  if (active_.size() <= 1) {  // if the propagation by the only model fails, P is unchanged
     if (!Propagate(p)) return FindNotFinite();
   } else if (IsBounded(p)) {
     Propagate(p);
@@ -222,7 +223,7 @@ bool Motions::Propagate(Covariance& p) {
   return true;
 }
 
-/// Propagates P by a model some of whose blocks are not in P.
+/// Propagates P by a model that has blocks without rows in P.
 [[gnu::noinline]] bool Motions::PropagatePart(Covariance& p, const MotionPlace& place,
                                               const Step& step, int width) {
   if (place.rows.empty()) return true;

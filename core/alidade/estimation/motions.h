@@ -12,11 +12,11 @@
 
 namespace alidade::internal {
 
-// Evaluation of motion models at a value x of the whole state, such as an estimate, a sigma point
-// or an iterate of a batch. n_w: number of noise inputs.
+// This header evaluates motion models at a value x of the whole state, such as an estimate, a sigma
+// point or an iterate of a batch. n_w: number of noise inputs.
 
-/// Error of a step. Converts to false if the step succeeded. Every step returns a StepError, so it
-/// is only as large as a pointer.
+/// Error of a step. Converts to false if the step succeeded. A StepError is only as large as a
+/// pointer, because every step returns one.
 class StepError {
  public:
   StepError() = default;
@@ -41,14 +41,15 @@ struct StepOutput {
   double* g = nullptr;     ///< G, n x n_w
   double* l = nullptr;     ///< L of Qw = L L', n_w x n_w
 };
-/// Computes x' = f(x, u, w, dt) of one motion model at the value x of the whole state. A null w
-/// means w = 0.
+/// Computes x' = f(x, u, w, dt) of one motion model at the value x of the whole state. A null
+/// pointer w means that w is 0.
 Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
                const double* u, const double* w, double dt_s, const StepOutput& output);
 /// Converts an outcome of StepAt to an error. Returns a StepError that converts to false if the
 /// outcome is kAccepted.
 StepError StepErrorOf(const MotionBinding& motion, Outcome outcome);
-/// Copies x' to x for the blocks that are not constant, and normalises them to their manifolds.
+/// Copies x' to x for the blocks that are not constant, and normalises the values to their
+/// manifolds.
 inline void TakeStep(const MotionPlace& place, const double* next, double* x) {
   for (const auto& [offset, size, geometry] : place.non_constant_ranges) {
     for (int i = offset; i < offset + size; ++i) x[i] = next[i];
@@ -69,7 +70,7 @@ class Motions {
     std::vector<double> l, gl;  ///< L of Qw, G L
     std::vector<double> cross;  ///< C = A N'; used if `continues_interval`
     std::vector<double> m;      ///< M; used if the noise is discrete
-    bool continues_interval = false;  ///< whether the discrete noise is that of the previous step
+    bool continues_interval = false;  ///< whether w is the same as in the previous step
   };
 
   explicit Motions(const ProblemIndex& index);
@@ -97,9 +98,9 @@ class Motions {
   int noise_size() const;  ///< n_w
   // The following functions return matrices of the last step, stored in `work`.
   Workspace::Matrix Transition(int n, Workspace& work) const;  ///< F, n x n
-  /// Returns G Lq if `matrix` is Step::gl, or M if it is Step::m: n x n_w, with the columns of the
-  /// models side by side. The columns of continuous noise are zero unless `with_continuous` is
-  /// true.
+  /// Returns G Lq if `matrix` is &Step::gl, or M if `matrix` is &Step::m. The result is n x n_w,
+  /// with the columns of the models side by side. The columns of continuous noise are zero unless
+  /// `with_continuous` is true.
   Workspace::Matrix NoiseColumns(std::vector<double> Step::*matrix, int n, Workspace& work,
                                  bool with_continuous = false) const;
 

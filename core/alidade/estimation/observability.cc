@@ -13,7 +13,7 @@
 namespace alidade {
 namespace {
 
-/// Positions of the landmarks in the camera frame, relative to the typical distance of landmarks.
+/// Positions of the landmarks in the camera frame, in units of the typical distance of landmarks.
 constexpr double kPositions[][3] = {{-0.2, 0.1, 1.0},   {0.23, -0.07, 1.3}, {0.1, 0.15, 0.8},
                                     {-0.1, -0.12, 1.6}, {0.02, 0.05, 2.1},  {0.17, 0.11, 1.15}};
 
@@ -23,7 +23,7 @@ const SharedSensor& XyzModel(const SensorBinding& sensor) {
   return xyz ? sensor.model : sensor.xyz;
 }
 
-/// Returns the block that fills the role with this name, or -1.
+/// Returns the block that fills the role with this name, or -1 if the sensor has no such role.
 BlockId BlockIn(const SensorBinding& sensor, const char* role) {
   for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
     if (sensor.model->roles()[i].name == role) return sensor.roles[i].block;
@@ -39,7 +39,7 @@ std::vector<double> PriorMeanOf(const Problem& problem, BlockId block,
   return has_mean ? prior->mean : default_mean;
 }
 
-/// Returns a copy of the sensor that measures only the landmark `block`.
+/// Returns a copy of the sensor. The copy measures only the landmark `block`.
 SensorBinding SensorOfLandmark(const SensorBinding& sensor, BlockId block) {
   SensorBinding binding{sensor.name, sensor.stream, XyzModel(sensor), {}};
   for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
@@ -52,9 +52,9 @@ SensorBinding SensorOfLandmark(const SensorBinding& sensor, BlockId block) {
 /// Values of the blocks at a point of a trajectory, and their columns in the observability matrix.
 struct Trajectory {
   std::vector<std::vector<double>> values;
-  std::vector<int> columns;  ///< by block: first column; -1: no column, because it is constant
-  std::vector<double> scale;
-  std::vector<std::string> names;
+  std::vector<int> columns;        ///< by block: first column; -1: the block is constant
+  std::vector<double> scale;       ///< by column: sigma of the prior, or 1
+  std::vector<std::string> names;  ///< by column: name of the block or block element
 };
 
 /// Returns a generic point near the prior. No element has a special value such as 0, and the point
@@ -148,8 +148,8 @@ class RowSpace {
   explicit RowSpace(Eigen::Index n) : q_(n, n) {}
 
   Eigen::Index rank() const { return rank_; }
-  /// Extends the basis by the part of `row` that is orthogonal to it, unless this part is a
-  /// rounding error.
+  /// Extends the basis by the part of `row` that is orthogonal to the basis, unless this part is
+  /// only a rounding error.
   void Add(Eigen::VectorXd row) {
     constexpr double kRankTolerance = 1e-9;
     const double norm = row.norm();
@@ -168,8 +168,8 @@ class RowSpace {
   Eigen::Index rank_ = 0;
 };
 
-/// Adds the rows H phi of a sensor, scaled to units of the prior sigma. Adds nothing if h is not
-/// defined at the values.
+/// Adds the rows H phi of a sensor. Their columns are scaled by the prior sigma. Adds no rows if h
+/// is not defined at the values.
 void AddSensorRows(const SensorBinding& sensor, const double* known, const Problem& problem,
                    const Trajectory& t, const Eigen::MatrixXd& phi, RowSpace& rows) {
   const Eigen::Map<const Eigen::RowVectorXd> scale(t.scale.data(), phi.cols());
@@ -204,8 +204,8 @@ void AddSensorRows(const SensorBinding& sensor, const double* known, const Probl
   for (Eigen::Index i = 0; i < m; ++i) rows.Add(h_phi.row(i).cwiseProduct(scale));
 }
 
-/// Adds the rows of every sensor. Sensors with known numbers are evaluated several times, with
-/// random known numbers of the magnitude of the state.
+/// Adds the rows of every sensor. A sensor that needs known numbers is evaluated several times,
+/// with random known numbers whose magnitude equals that of the state.
 void AddObservationRows(const Problem& problem, const Trajectory& t, const Eigen::MatrixXd& phi,
                         Random& random, RowSpace& rows) {
   constexpr int kMeasurements = 4;
@@ -222,8 +222,8 @@ void AddObservationRows(const Problem& problem, const Trajectory& t, const Eigen
   }
 }
 
-/// Adds the elements with an exact prior, and the positions of known landmarks. If the problem has
-/// landmarks, these elements and positions define the world frame.
+/// Adds one row for each element with an exact prior and for each coordinate of a known landmark.
+/// In a problem with landmarks, these elements and coordinates define the world frame.
 void AddKnown(const internal::ProblemWithLandmarks& landmark_problem, const Trajectory& t,
               RowSpace& rows) {
   const auto n = static_cast<Eigen::Index>(t.names.size());
@@ -241,8 +241,8 @@ void AddKnown(const internal::ProblemWithLandmarks& landmark_problem, const Traj
 }
 
 /// Removes the direction of scale from a basis of the null space. This direction moves each
-/// landmark p along its offset from the camera r, d p = p - r, and may move the other blocks.
-/// Returns false if the null space does not contain the direction.
+/// landmark p away from the camera r, by d p = p - r. It may also move other blocks. Returns false
+/// if the null space does not contain the direction of scale.
 bool RemoveScale(const internal::ProblemWithLandmarks& landmark_problem, const Trajectory& start,
                  Eigen::MatrixXd& basis) {
   constexpr double kTolerance = 1e-5;
@@ -263,8 +263,8 @@ bool RemoveScale(const internal::ProblemWithLandmarks& landmark_problem, const T
   return true;
 }
 
-/// Converts the columns of a basis of the null space to reduced echelon form. Each column then
-/// moves few elements.
+/// Converts the columns of a basis of the null space to reduced echelon form. Each column then has
+/// few non-zero elements.
 void Reduce(Eigen::MatrixXd& basis) {
   Eigen::Index rank = 0;
   for (Eigen::Index row = 0; row < basis.rows() && rank < basis.cols(); ++row) {
@@ -351,8 +351,9 @@ std::vector<std::vector<std::string>> internal::UnobservableDirections(
   if (landmark_problem) AddKnown(*landmark_problem, t, rows);
   Random random(1), known(2);
   Random* const changing = excitation == Excitation::kChanging ? &random : nullptr;
-  // If a step does not increase the rank, later steps do not either, because state and inputs are
-  // generic. The loop ends after two such steps, because trajectories turn.
+  // If a step does not increase the rank, later steps usually do not increase the rank either,
+  // because state and inputs are generic. The loop ends only after two such steps in a row, because
+  // the rank may increase again when the trajectory turns.
   for (int idle = 0; idle < kIdleSteps && rows.rank() < n;) {
     const Eigen::Index previous_rank = rows.rank();
     AddObservationRows(problem, t, phi, known, rows);
@@ -372,7 +373,8 @@ std::vector<std::vector<std::string>> internal::UnobservableDirections(
       const std::string& name = start.names[static_cast<std::size_t>(i)];
       if (names.empty() || names.back() != name) names.push_back(name);
     }
-    // A direction that changes only landmarks becomes observable as the trajectory continues.
+    // A direction that changes only landmarks is omitted. It becomes observable as the trajectory
+    // continues.
     if (!landmark_problem || names.front() != internal::kLandmarks)
       directions.push_back(std::move(names));
   }

@@ -10,7 +10,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Dynamics that both motion models below use: the decay a, and the square root of Q.
+/// Dynamics of a model parameter state: the decay a and the square root of Q. Both motion models
+/// below use them.
 struct Dynamics {
   explicit Dynamics(const OwnedRole& owned, std::size_t n)
       : mean(owned.mean), l(owned.sqrt_density), tau_s(owned.time_constant_s) {
@@ -36,7 +37,7 @@ struct Dynamics {
   double tau_s;
 };
 
-/// Motion model of a vector of any size.
+/// Motion model of a model parameter state that is a vector of any size.
 struct OwnedVectorMotion : Motion<kDynamic, Vec<kDynamic>> {
   static constexpr std::array kBlocks{Quantity{"value"}};
 
@@ -67,7 +68,7 @@ struct OwnedVectorMotion : Motion<kDynamic, Vec<kDynamic>> {
   void SqrtQ(double dt_s, MatrixRef q) const { dynamics.SqrtQ(dt_s, size, q); }
 };
 
-/// Motion model of a value whose geometry has a fixed size.
+/// Motion model of a model parameter state whose geometry has a fixed size.
 template <class G>
 struct OwnedGeometryMotion : Motion<G::kTangent, G> {
   static constexpr std::array kBlocks{Quantity{"value"}};

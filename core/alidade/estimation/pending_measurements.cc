@@ -27,7 +27,7 @@ namespace alidade::internal {
   s = innovation + m;
   R = {s + m * m, m * m};
   root = s + 2 * m * m;
-  // NaN shows whether the model writes all elements.
+  // NaN reveals elements that the model does not write.
   std::fill(h, numbers.data() + numbers.size(), kNotANumber);
   H.assign(m * width, kNotANumber);
   for (std::size_t i = 0; i < sensor_place.columns.size(); ++i) {
@@ -60,14 +60,15 @@ namespace alidade::internal {
   entry.z = {pending.z, static_cast<std::size_t>(pending.place->ambient)};
 }
 
-/// Sets PendingMeasurement::report. Called after the last entry was appended, because the entries
-/// move in memory before.
+/// Sets PendingMeasurement::report. Must be called after the last entry was appended, because
+/// appending may move the entries in memory.
 void PendingMeasurements::PointToReports(UpdateReport& report) {
   MeasurementReport* entry = report.measurements().data();
   for (PendingMeasurement& pending : all()) pending.report = entry++;
 }
 
-/// Returns kAccepted if the measurement can be used, else the reason why it cannot.
+/// Returns kAccepted if the measurement can be used. Otherwise returns the outcome that states the
+/// reason.
 [[gnu::always_inline]] inline Outcome PendingMeasurements::Check(
     const PendingMeasurement& pending) {
   const Measurement& m = *pending.measurement;
@@ -79,7 +80,8 @@ void PendingMeasurements::PointToReports(UpdateReport& report) {
   return OutcomeOf(pending.model->Valid({m.values.data(), m.known.data()}));
 }
 
-/// Checks the known numbers and the covariance of a measurement.
+/// Checks the known numbers and the covariance of a measurement. Returns kAccepted if both are
+/// valid.
 [[gnu::noinline]] Outcome PendingMeasurements::CheckKnownAndCovariance(
     const PendingMeasurement& pending) {
   const Measurement& m = *pending.measurement;
@@ -178,14 +180,15 @@ void ChainJacobian(PendingMeasurement& pending, int column, int size, const doub
   const SensorBinding& sensor = *pending.binding;
   if (outcome == Outcome::kFailed) ReportPluginFailure(f, pending);
   char& is_reported = f.health.out_of_domain[static_cast<std::size_t>(pending.sensor)];
-  // A landmark that is out of domain, such as behind the camera, does not mean that the filter
-  // diverged.
+  // A landmark outside the domain of the sensor, such as a landmark behind the camera, does not
+  // mean that the filter diverged.
   if (outcome != Outcome::kOutOfDomain || pending.is_on_landmark() || is_reported != 0) return;
   is_reported = 1;
   std::vector<BlockId> blocks;
   for (const RoleBinding& role : sensor.roles) blocks.push_back(role.block);
-  AddDivergenceEvent(f, EventKind::kDiverged,
-                     "sensor '" + sensor.name + "' is not defined at " + Describe(f.state, blocks));
+  AddDivergenceEvent(
+      f, EventKind::kDiverged,
+      "the model of sensor '" + sensor.name + "' is not defined at " + Describe(f.state, blocks));
 }
 
 }  // namespace alidade::internal

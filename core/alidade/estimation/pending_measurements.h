@@ -24,16 +24,16 @@ struct PendingMeasurement {
   /// Model of the sensor, or its model for the representation of the measured landmark.
   const SensorModel* model = nullptr;
   const SensorPlace* place = nullptr;  ///< place of the sensor, or &landmark_place; set by Bind
-  SensorPlace landmark_place;          ///< includes the blocks of the measured landmark
+  SensorPlace landmark_place;          ///< place that includes the blocks of the measured landmark
   std::vector<double> numbers;         ///< z, h, innovation, S, R and L; the report points to them
   double *z = nullptr, *h = nullptr, *innovation = nullptr, *s = nullptr;  ///< s: m x m, row-major
   std::span<double> R;                                                     ///< R, m x m, row-major
   double* root = nullptr;                                                  ///< L of R = L L'
   std::vector<double> H;                       ///< m rows of place->width columns, row-major
-  std::vector<double> gain;                    ///< K, in the order of the report
+  std::vector<double> gain;                    ///< K, column by column (MeasurementReport::gain)
   std::array<double*, kMaxRoles> jacobians{};  ///< by role: pointer to its first column in H
-  Roles roles{};                               ///< the result of the last RolesAt
-  const double* roles_source = nullptr;        ///< values of the state, if `roles` point to them
+  Roles roles{};                               ///< result of the last call of RolesAt
+  const double* roles_source = nullptr;        ///< state values to which `roles` points, or null
   double weight = 1.0;                         ///< w of the robust loss; R is divided by w
   MeasurementRows linearised;  ///< H, innovation, R, S, and the first column in the update
 
@@ -47,14 +47,14 @@ struct PendingMeasurement {
 /// for the next frame.
 class PendingMeasurements {
  public:
-  /// Collects the measurements of all sensors, in the order of the sensors, and appends an entry
-  /// for each to the report. The outcome is kAccepted, unless the measurement is not finite or
-  /// invalid for its sensor. If `common_outcome` is not kAccepted, no model is called, and every
-  /// measurement gets this outcome.
+  /// Collects the measurements of all sensors, in the order of the sensors. Appends an entry for
+  /// each measurement to the report. The outcome is kAccepted, unless the measurement is not finite
+  /// or invalid for its sensor. If `common_outcome` is not kAccepted, no model is called, and every
+  /// measurement has this outcome.
   void Collect(const Frame& frame, const ProblemIndex& index, UpdateReport& report,
                Outcome common_outcome = Outcome::kAccepted);
-  /// Collects one measurement for one sensor, with the outcome kAccepted. Ignores the stream of the
-  /// measurement.
+  /// Collects one measurement of one sensor, with the outcome kAccepted. Does not use
+  /// Measurement::stream.
   PendingMeasurement& CollectOne(const Measurement& measurement, int sensor,
                                  const ProblemIndex& index, UpdateReport& report);
   std::span<PendingMeasurement> all() {
@@ -107,10 +107,10 @@ Outcome PredictAt(const FilterState& f, PendingMeasurement& pending, const std::
   }
   return OutcomeOf(status);
 }
-/// Computes R at the values of the roles. If the measurement has a covariance, copies it to R
-/// instead.
+/// Computes R at the values of the roles. If the measurement has a covariance, copies the
+/// covariance to R instead.
 Outcome NoiseAt(PendingMeasurement& pending, const double* const* roles);
-/// Computes the innovation z (-) h for the last h. The report then points to the innovation.
+/// Computes the innovation z (-) h from pending.h. The report then points to the innovation.
 inline void ComputeInnovation(PendingMeasurement& pending) {
   pending.report->innovation = {pending.innovation, static_cast<std::size_t>(pending.place->dof)};
   pending.model->measurement().geometry.Minus(pending.z, pending.h, pending.innovation);
@@ -123,9 +123,11 @@ void ChainJacobian(PendingMeasurement& pending, int column, int size, const doub
 /// as L D L'.
 double SquaredMahalanobis(const double* s, const double* r, int m, Workspace& work);
 
-/// Reports that h could not be computed. If h is not defined, marks the filter as diverged. This is
-/// reported once, until a measurement of the sensor is accepted again.
+/// Reports that h could not be computed. If h is not defined, marks the filter as diverged, unless
+/// the measurement is of a landmark. An undefined h is reported only once before a measurement of
+/// the sensor is accepted again.
 void ReportRefusal(FilterState& f, const PendingMeasurement& pending, Outcome outcome);
+/// Reports the error text of the sensor model (event `plugin_failed`).
 void ReportPluginFailure(FilterState& f, const PendingMeasurement& pending);
 
 }  // namespace alidade::internal

@@ -29,7 +29,7 @@ Prior PriorOf(const InitialValue& initial, const Space& space, BlockId block,
   const std::string value =
       "the initial value of '" + space.name + "', " + internal::WithArticle(ToString(geometry));
   if (std::ssize(prior.mean) != geometry.ambient) {
-    Fail(place, value + ", has " + std::to_string(prior.mean.size()) + " numbers; expected " +
+    Fail(place, value + ", has the size " + std::to_string(prior.mean.size()) + "; expected " +
                     std::to_string(geometry.ambient));
   }
   if (!internal::AllFinite(prior.mean)) {
@@ -80,8 +80,8 @@ int AddStream(Problem& problem, const StreamInfo& stream, const std::string& pla
       return "size " + std::to_string(info.size) + " and " + std::to_string(info.known) +
              " known numbers";
     };
-    Fail(place,
-         "stream '" + stream.name + "' has " + sizes(*found) + "; expected " + sizes(stream));
+    Fail(place, "stream '" + stream.name + "' is already used with measurements of " +
+                    sizes(*found) + "; expected " + sizes(stream));
   }
   return static_cast<int>(found - problem.streams.begin());
 }
@@ -92,17 +92,20 @@ void CheckRole(const Problem& problem, const Space& role, const RoleBinding& bin
   const std::string geometry = internal::WithArticle(ToString(role.geometry));
   if (binding.block < 0) {
     if (!role.optional()) {
-      Fail(place, "role '" + role.name + "' has no block; expected " + geometry);
+      Fail(place, "role '" + role.name + "' has no block; expected a block that is " + geometry);
     }
     return;
   }
   if (binding.block >= std::ssize(problem.layout.blocks())) {
-    Fail(place, "role '" + role.name + "' has a block of another problem; expected " + geometry);
+    Fail(place, "role '" + role.name +
+                    "' has a block of another problem; expected a block of this problem that is " +
+                    geometry);
   }
   const Block& block = problem.layout[binding.block];
   if (block.geometry() == role.geometry) return;
-  Fail(place, "role '" + role.name + "' has block '" + block.name + "', " +
-                  internal::WithArticle(ToString(block.geometry())) + "; expected " + geometry);
+  Fail(place, "role '" + role.name + "' has the block '" + block.name + "', which is " +
+                  internal::WithArticle(ToString(block.geometry())) +
+                  "; expected a block that is " + geometry);
 }
 
 }  // namespace
@@ -153,7 +156,7 @@ BlockId StateHandle::operator[](std::string_view block) const {
   std::vector<std::string> names;
   for (const auto& entry : blocks) names.push_back(entry.first);
   Fail("state '" + name + "'",
-       "no block '" + std::string(block) + "'; expected " + internal::Join(names));
+       "the state has no block '" + std::string(block) + "'; expected " + internal::Join(names));
 }
 
 StateHandle Problem::AddState(const std::string& name, SharedMotion model,
@@ -166,10 +169,11 @@ StateHandle Problem::AddState(const std::string& name, SharedMotion model,
   const std::vector<Space>& spaces = model->blocks();
   for (const InitialValue& value : initial) {
     if (std::ranges::count(initial, value.block, &InitialValue::block) > 1) {
-      Fail(place, "two initial values of '" + value.block + "'; expected only one");
+      Fail(place, "block '" + value.block + "' has several initial values; expected one");
     }
     if (std::ranges::count(spaces, value.block, &Space::name) == 0) {
-      Fail(place, "no block '" + value.block + "'; expected " + internal::Join(NamesOf(spaces)));
+      Fail(place, "the model has no block '" + value.block + "'; expected " +
+                      internal::Join(NamesOf(spaces)));
     }
   }
   std::vector<InitialValue> values;  // in the order of the model's blocks
@@ -181,15 +185,15 @@ StateHandle Problem::AddState(const std::string& name, SharedMotion model,
     } else if ((space.flags & ALIDADE_ROLE_OWNED) != 0) {
       values.push_back(InitialValue::Constant(space.name, space.geometry.Identity()));
     } else {
-      Fail(place, "no initial value of '" + space.name + "'; expected one");
+      Fail(place, "block '" + space.name + "' has no initial value; expected one");
     }
     if (values.back().name.empty()) values.back().name = space.name;
     added.push_back(PriorOf(values.back(), space, -1, place));
   }
   if (!input.stream.empty() && !model->has_input()) {
-    Fail(place, "model '" + model->name() + "' has no control input; expected no `input`");
+    Fail(place, "model '" + model->name() + "' has no control input; remove `input`");
   }
-  Problem changed = *this;  // so that an exception leaves this problem unchanged
+  Problem changed = *this;  // a copy, so that an exception leaves this problem unchanged
   StateHandle handle{name, {}, -1};
   MotionBinding motion{name, std::move(model), {}, {}};
   for (std::size_t i = 0; i < spaces.size(); ++i) {
@@ -223,8 +227,9 @@ SensorHandle Problem::AddSensor(const std::string& name, SharedSensor model,
   const auto landmark_roles = std::ranges::count_if(spaces, &Space::landmark);
   const auto block_roles = std::ssize(spaces) - landmark_roles;
   if (std::ssize(roles) > block_roles) {
-    Fail(place, std::to_string(roles.size()) + " blocks for the roles; expected " +
-                    std::to_string(block_roles) + ": " + internal::Join(NamesOf(spaces)));
+    Fail(place, "the number of blocks for the roles is " + std::to_string(roles.size()) +
+                    "; expected at most " + std::to_string(block_roles) + ": " +
+                    internal::Join(NamesOf(spaces)));
   }
   roles.resize(spaces.size());
   const auto is_owned = [&](std::size_t i) {
@@ -245,10 +250,10 @@ SensorHandle Problem::AddSensor(const std::string& name, SharedSensor model,
                     "the flag ALIDADE_ROLE_OWNED and without a block");
   }
   if (options.loss.kind != LossKind::kNone && !(options.loss.scale > 0.0)) {
-    Fail(place, "the robust loss has the scale " + internal::RoundedText(options.loss.scale) +
-                    "; expected > 0");
+    Fail(place, "the scale of the robust loss is " + internal::RoundedText(options.loss.scale) +
+                    "; expected a number > 0");
   }
-  Problem changed = *this;  // so that an exception leaves this problem unchanged
+  Problem changed = *this;  // a copy, so that an exception leaves this problem unchanged
   for (std::size_t i = 0; i < spaces.size(); ++i) {
     if (!is_owned(i)) continue;
     const auto option = options.owned.find(i);

@@ -21,11 +21,11 @@
 
 namespace alidade {
 
-/// How an update treats the block that fills a role.
+/// Mode of a role: the treatment of its block by an update.
 enum class RoleMode {
   kEstimate,  ///< corrected
   kConsider,  ///< not corrected, but its uncertainty is included in S (Schmidt)
-  kKnown,     ///< not corrected, and treated as exact: its Jacobian is zero
+  kKnown,     ///< not corrected and treated as exact, so that its Jacobian is zero
 };
 
 /// Value of a role at which the Jacobian of a sensor is evaluated: the prediction, or the value
@@ -52,19 +52,19 @@ struct SensorBinding {
   std::string stream;
   SharedSensor model;
   std::vector<RoleBinding> roles;
-  RobustLoss loss = {};  ///< loss of the Mahalanobis distance of the innovation
-  /// Model of the same sensor for landmarks with the representation xyz. Required if `model` has
-  /// another representation, and landmarks are converted to xyz or start as xyz. The roles before
-  /// the landmark equal those of `model`.
+  RobustLoss loss = {};  ///< function of the Mahalanobis distance of the innovation
+  /// Model of the same sensor for landmarks with the representation xyz. If `model` has another
+  /// representation, `xyz` is required for landmarks that are converted to xyz or start as xyz. The
+  /// roles before the landmark roles must equal those of `model`.
   SharedSensor xyz = {};
-  /// Outlier rejection among the matches of a frame. nullopt: only the gate rejects measurements.
+  /// Outlier rejection for the matches of a frame. nullopt: only the gate rejects measurements.
   std::optional<OnePointRansac> outlier_rejection = {};
 };
 
 /// Control input of a motion model.
 struct InputBinding {
   std::string stream;  ///< "" if the model has no control input
-  /// An input no longer acts once its age reaches this time.
+  /// Age at which an input stops acting.
   double timeout_s = std::numeric_limits<double>::infinity();
 };
 
@@ -81,9 +81,8 @@ struct Prior {
   BlockId block = -1;
   std::vector<double> mean;
   Eigen::MatrixXd covariance;
-  std::string
-      /// Sensor that initialises the block. "": the block starts from mean and covariance.
-      sensor;
+  /// Sensor that initialises the block. "": the block starts from mean and covariance.
+  std::string sensor;
 };
 
 /// Initial value of a block of a state: a mean with standard deviations, or the first measurement
@@ -116,18 +115,18 @@ struct InitialValue {
   std::string sensor;
 };
 
-/// Model parameter state of a sensor, such as a bias: its initial value and process.
+/// Initial value and process of a model parameter state of a sensor, such as a bias.
 struct OwnedState {
   /// Converts the prior and dynamics that a sensor model defines for one of its roles.
   static OwnedState Of(const OwnedRole& owned);
 
   InitialValue initial;
-  /// Only dynamics, density and time constant are used. A Gauss-Markov process decays to the mean
-  /// of `initial`.
+  /// Process of the state. Only the dynamics, density and time constant are used. A Gauss-Markov
+  /// process decays to the mean of `initial`.
   OwnedRole process;
 };
 
-/// State of a problem, returned by Problem::AddState: the ids of its blocks by name.
+/// State of a problem, with the ids of its blocks. Problem::AddState returns it.
 struct StateHandle {
   /// Returns the id of a block. Throws Error kBadConfig if the name is unknown.
   BlockId operator[](std::string_view block) const;
@@ -137,19 +136,19 @@ struct StateHandle {
   int input = -1;  ///< stream of the control input; -1: no control input
 };
 
-/// Sensor of a problem, returned by Problem::AddSensor.
+/// Sensor of a problem. Problem::AddSensor returns it.
 struct SensorHandle {
   int index = -1;   ///< index into Problem::sensors
   int stream = -1;  ///< index into Problem::streams
 };
 
-/// Options of a sensor, apart from its model and roles.
+/// Optional properties of a sensor.
 struct SensorOptions {
-  std::string stream = {};  ///< empty: the name of the sensor
+  std::string stream = {};  ///< name of the stream; empty: equal to the name of the sensor
   RobustLoss loss = {};
-  SharedSensor xyz = {};  ///< SensorBinding::xyz
+  SharedSensor xyz = {};  ///< see SensorBinding::xyz
   std::optional<OnePointRansac> outlier_rejection = {};
-  /// Model parameter states, by role. They replace the prior and dynamics that the model defines.
+  /// By role: model parameter state that replaces the prior and dynamics that the model defines.
   std::map<std::size_t, OwnedState> owned = {};
 };
 
@@ -158,9 +157,8 @@ struct SensorOptions {
 /// Error kBadConfig with the reason and leave the problem unchanged.
 struct Problem {
   /// Adds a state with the blocks of the model and their initial values. A block with the flag
-  /// ALIDADE_ROLE_OWNED that has no initial value is constant at the neutral element. `input`
-  /// applies if the model has a control input. The default stream of the control input is
-  /// NAME.INPUT.
+  /// ALIDADE_ROLE_OWNED and without an initial value is constant at the neutral element. `input`
+  /// describes the control input, if the model has one. Its default stream is NAME.INPUT.
   StateHandle AddState(const std::string& name, SharedMotion model,
                        const std::vector<InitialValue>& initial, const InputBinding& input = {});
   template <MotionStruct Model>
@@ -181,7 +179,7 @@ struct Problem {
 
   /// Returns the state before the first measurement, in the order of the layout. All blocks with a
   /// mean are present. If `reserved` is true, blocks that start from a measurement also have
-  /// offsets.
+  /// offsets in x and P.
   State InitialState(bool reserved = false) const;
   /// Returns the index of a sensor, or -1 for an unknown name.
   int FindSensor(std::string_view name) const;
@@ -197,7 +195,8 @@ struct Problem {
 
 namespace internal {
 
-/// Returns the block of the position from which landmarks are observed, or -1 if it does not exist.
+/// Returns the block of the position from which landmarks are observed, or -1 if the problem has no
+/// such block.
 BlockId PositionBlockOf(const Problem& problem);
 
 /// Adds the model parameter state SENSOR.ROLE of a sensor, with its process. Throws Error
@@ -205,8 +204,8 @@ BlockId PositionBlockOf(const Problem& problem);
 BlockId AddOwnedState(Problem& problem, const std::string& sensor, const Space& role,
                       OwnedState state);
 
-/// Returns the unit of a block. If the block has no unit, returns the unit of a sensor role that it
-/// fills.
+/// Returns the unit of a block. If the block has no unit, returns the unit of a sensor role that
+/// the block fills.
 std::string UnitOf(const Problem& problem, BlockId id);
 
 }  // namespace internal

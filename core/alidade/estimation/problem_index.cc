@@ -39,7 +39,7 @@ SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial) {
 }
 
 /// Appends the range of a block with this geometry and this offset in x. If the block and the
-/// previous range are adjacent vectors, extends that range.
+/// previous range are adjacent vectors, extends the previous range.
 void AddRange(std::vector<MotionPlace::ValueRange>& ranges, const Geometry& geometry, int offset) {
   const bool is_curved = !geometry.is_vector();
   const bool is_adjacent = !ranges.empty() && !is_curved && ranges.back().geometry == nullptr &&

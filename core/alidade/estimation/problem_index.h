@@ -13,18 +13,18 @@ namespace alidade::internal {
 /// Pointers to the values of the roles of a sensor.
 using Roles = std::array<const double*, kMaxRoles>;
 
-/// Offsets of the roles of a sensor in x, P and H. The roles of a landmark come last. Their offsets
-/// are set when a measurement names the landmark.
+/// Offsets of the roles of a sensor in x, P and H. The roles of a landmark come last. The offsets
+/// of these roles are set when a measurement names the landmark.
 struct SensorPlace {
   int sensor = -1;  ///< index into Problem::sensors
   const SensorBinding* binding = nullptr;
   std::vector<int> values;          ///< by role: offset in x; -1: the role has no block
   std::vector<char> is_known;       ///< by role: whether its mode is RoleMode::kKnown
-  std::vector<int> columns;         ///< by role: first column of its Jacobian in H; -1: zero
-  std::vector<int> strides;         ///< by role: stride of its Jacobian for the model, `width`
+  std::vector<int> columns;         ///< by role: first column of its Jacobian in H; -1: none
+  std::vector<int> strides;         ///< by role: row stride of its Jacobian, equal to `width`
   std::vector<JacobianPart> parts;  ///< parts of a row of H: one for each role with a Jacobian
   std::vector<int> rows;            ///< by column of H: row of P
-  std::vector<bool> is_consider;    ///< by part: whether its mode is RoleMode::kConsider
+  std::vector<bool> is_consider;    ///< by part: whether its role has RoleMode::kConsider
   bool has_consider = false;        ///< whether any part is a consider state
   bool linearises_at_measurement = false;  ///< whether a role has JacobianAt::kMeasurement
   bool has_landmark = false;
@@ -53,9 +53,9 @@ struct MotionPlace {
   bool holds = false;  ///< whether the noise is discrete (constant over an interval)
 };
 
-/// Problem with its names resolved to indices: the stream of each sensor, and the offsets of the
-/// blocks of sensors and motion models. The offsets are reserved for blocks without a value too, so
-/// they never change. The blocks of landmarks come after all other blocks.
+/// Problem whose names are resolved to indices: the stream of each sensor, and the offsets of the
+/// blocks of sensors and motion models. Offsets are also reserved for blocks without a value, so
+/// that the offsets never change. The blocks of landmarks come after all other blocks.
 struct ProblemIndex {
   /// `source_streams` are the streams of the source, in the order of Measurement::stream.
   /// ContractViolation if the size of a stream differs from the size of its sensor's measurement.
@@ -63,11 +63,11 @@ struct ProblemIndex {
 
   const Problem problem;
   const std::vector<StreamInfo> streams;
-  const State
-      initial;  ///< state before the first measurement; has space for all blocks with a prior
+  /// State before the first measurement, with space for all blocks that have a prior.
+  const State initial;
   std::vector<SensorPlace> sensor_places;
   std::vector<MotionPlace> motion_places;
-  std::vector<int> stream_of_sensor;  ///< by sensor: index of the stream; -1: not in the source
+  std::vector<int> stream_of_sensor;  ///< by sensor: index of its stream; -1: not in the source
   bool has_consider = false;          ///< whether a role of a sensor is a consider state
 };
 

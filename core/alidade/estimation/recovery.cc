@@ -12,17 +12,17 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns A + (B - A)+, with (.)+ the positive part of a matrix. In every direction, this
-/// covariance is at least A and at least B.
+/// Returns A + (B - A)+, an upper bound of the covariances A and B. (.)+ is the positive part of a
+/// matrix.
 Eigen::MatrixXd UpperBound(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   const SymmetricEigen difference = EigenOf(b - a);
   const Eigen::VectorXd positive = difference.values.cwiseMax(0.0);
   return a + ProductTransposed(difference.vectors * positive.asDiagonal(), difference.vectors);
 }
 
-/// Resets the covariance of the other blocks of the motion model of block `id` to an upper bound of
-/// prior and current covariance, without correlations. The values of these blocks are unchanged.
-/// Block `id` itself is initialised afterwards.
+/// Resets the covariance of all blocks that belong to the same motion model as block `id`. The new
+/// covariance of a block is an upper bound of its prior and current covariance, without
+/// correlations. The values are unchanged. The caller initialises block `id` afterwards.
 void ResetMotionBlocks(FilterState& f, BlockId id) {
   for (const MotionBinding& motion : f.problem_index->problem.motions) {
     if (std::ranges::find(motion.blocks, id) == motion.blocks.end()) continue;
@@ -76,7 +76,8 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
   const std::string text = "the covariance is not positive semi-definite: a pivot is " +
                            RoundedText(defect, 3) + " times the largest variance";
   if (repairs_ == options_.max_covariance_repairs) {
-    return End(f, EventKind::kNotPd, text + ", after " + std::to_string(repairs_) + " repairs");
+    return End(f, EventKind::kNotPd,
+               text + "; the limit of repairs is " + std::to_string(repairs_));
   }
   ++repairs_;
   f.motions.EndInterval();

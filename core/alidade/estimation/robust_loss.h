@@ -15,12 +15,12 @@ enum class LossKind {
 
 /// Robust loss rho(d) of the Mahalanobis distance d >= 0 of a residual, with the scale k
 /// [Holland1977]. A squared error with the weight w(d) = rho'(d) / d has the same gradient. A
-/// measurement with the covariance R therefore acts like one with the covariance R / w.
+/// measurement with the covariance R therefore acts like a measurement with the covariance R / w.
 struct LossFunctions {
   const char* name;  ///< name in configs
   double (*rho)(double d, double k);
   double (*weight)(double d, double k);     ///< w(d), in [0, 1]
-  double (*curvature)(double d, double k);  ///< w'(d) / (2 d), d > 0: curvature of rho over d^2
+  double (*curvature)(double d, double k);  ///< dw / d(d^2) = w'(d) / (2 d), for d > 0
 };
 
 /// Functions of all losses, indexed by LossKind.

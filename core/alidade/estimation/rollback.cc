@@ -81,7 +81,7 @@ Rollback::Processed Rollback::Reject(Frame frame) {
       {rejected.frame.timestamp, EventKind::kStale,
        "the frame at " + internal::SecondsText(rejected.frame.timestamp) + " is " +
            internal::SecondsText(internal::Lag(newest, rejected.frame.timestamp)) +
-           " older than the newest frame, more than the window of " +
+           " older than the newest frame, which exceeds the window of " +
            internal::SecondsText(window_) + ": the measurements of this frame are not used"}};
   rejected.snapshot = filter_->Clone();
   rejected_.clear();

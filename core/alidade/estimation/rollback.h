@@ -20,7 +20,7 @@ struct ProcessedFrame {
 };
 
 /// Latest frames of an estimator, each with a copy of the estimator after the frame
-/// (Estimator::Clone). Used for the rollback in programs (Rollback) and in runs.
+/// (Estimator::Clone). The class Rollback and the runs of experiments use it.
 class Snapshots {
  public:
   /// Starts with a copy of an estimator before its first frame. ContractViolation if the estimator
@@ -28,13 +28,13 @@ class Snapshots {
   explicit Snapshots(const Estimator& start);
 
   const std::deque<ProcessedFrame>& frames() const { return frames_; }
-  /// Returns the frame that was released last. Before the first Release, returns the initial
-  /// estimator without a frame.
+  /// Returns the frame that was released last. Before the first Release, the result contains the
+  /// initial estimator, but no frame.
   const ProcessedFrame& released() const { return released_; }
-  /// Returns the estimator to its copy before the frame `first`, and processes `frames`, which
-  /// replace that frame and all later ones. If `first` is frames().size(), `frames` are appended.
-  /// If the estimator throws, the snapshots are unchanged. The estimator is then also unchanged,
-  /// unless `frames` were to be appended.
+  /// Restores the estimator from the copy before the frame with the index `first`. Then processes
+  /// `frames`, which replace that frame and all later frames. If `first` is frames().size(),
+  /// appends `frames`. If the estimator throws, the snapshots are unchanged. The estimator is then
+  /// also unchanged, unless `first` is frames().size().
   void Replace(std::size_t first, std::vector<Frame> frames, std::unique_ptr<Estimator>& estimator);
   /// Releases the oldest frame, which can then no longer be replaced. ContractViolation if frames()
   /// is empty.
@@ -51,14 +51,15 @@ class Snapshots {
 /// processes them in the order of their timestamps.
 ///
 /// Rollback stores the frames of the last `window_s` seconds, each with a copy of the filter after
-/// it. If a new frame is older than the newest one, the filter returns to the copy before the new
-/// frame. It then processes the new frame, and the later ones again. The state then equals, bit by
-/// bit, the state after processing the same frames in order. Frames with equal timestamps are
-/// processed in their order of arrival. Rollback can be moved, but not copied. A copy of filter()
-/// is independent.
+/// the frame. If a new frame is older than the newest stored frame, the filter is restored from the
+/// copy before the new frame. The new frame is then processed, and the later frames are processed
+/// again. The resulting state is bit-identical to the state after processing the same frames in
+/// order. Frames with equal timestamps are processed in their order of arrival. Rollback can be
+/// moved, but not copied. A copy of filter() is an independent filter.
 class Rollback {
  public:
-  /// Frames that a call processed, in the order of their timestamps. Valid until the next call.
+  /// Frames that a call processed, in the order of their timestamps. The iterators are valid until
+  /// the next call.
   class Processed {
    public:
     using Iterator = std::deque<ProcessedFrame>::const_iterator;
@@ -77,10 +78,10 @@ class Rollback {
   Rollback(const Filter& filter, double window_s);
 
   /// Processes the frame. Returns the frame, followed by the later frames that were processed
-  /// again. A frame that is more than window_s older than the newest one is rejected: the filter is
-  /// unchanged, and the report has `stale` set and contains an event.
+  /// again. A frame that is more than window_s older than the newest frame is rejected. The filter
+  /// is then unchanged, UpdateReport::stale is true, and the report contains an event.
   Processed Process(Frame frame);
-  /// Calls Process with the readings of one timestamp. Throws the errors of Filter::Push; the
+  /// Calls Process with the readings of one timestamp. Throws the same errors as Filter::Push. The
   /// filter is then unchanged.
   template <std::floating_point Seconds>
   Processed Push(Seconds t_s, const std::vector<Reading>& readings) = delete;
@@ -94,9 +95,9 @@ class Rollback {
   Processed Reject(Frame frame);
 
   Timestamp window_;
-  std::unique_ptr<Estimator> filter_;  // a Filter; so are its copies
+  std::unique_ptr<Estimator> filter_;  // the object is always a Filter
   Snapshots snapshots_;
-  std::deque<ProcessedFrame> rejected_;  ///< frames that the last call rejected
+  std::deque<ProcessedFrame> rejected_;  ///< the frame that was rejected last
 };
 
 namespace internal {

@@ -17,8 +17,8 @@ struct Adjoint {
   Eigen::VectorXd b;
   Eigen::MatrixXd information;
 
-  /// Applies the step to lambda and Lambda. At the end of the frame, both have `end_noise` rows for
-  /// w after the rows for x.
+  /// Applies the step to lambda and Lambda. At the end of the frame, lambda and Lambda have
+  /// `end_noise` rows for w after the rows for x.
   void StepBack(Eigen::Index end_noise, Eigen::VectorXd& lambda,
                 Eigen::MatrixXd& lambda_matrix) const {
     const Eigen::Index n = a.rows(), start_noise = a.cols() - n;
@@ -79,7 +79,8 @@ Outcome RecordingEquations::Correct(FilterState& f, std::span<PendingMeasurement
   if (outcome != Outcome::kAccepted || f.size() == 0) return outcome;
   const Workspace::Use use(f.work);
   const Eigen::Index n = f.size(), m = f.update.rows();
-  // With S = l l', w = P H' l^-T, g = l^-1 H: K H = w g, H' S^-1 H = g' g, H' S^-1 r = g' y.
+  // If S = l l', w = P H' l^-T and g = l^-1 H, then K H = w g, H' S^-1 H = g' g and H' S^-1 r =
+  // g' y.
   Eigen::MatrixXd l(m, m), w(n, m), g = JacobianOf(f, rows);
   Eigen::VectorXd y(m);
   f.update.CopyFactor(l);
@@ -141,7 +142,7 @@ const UpdateReport& RtsSmoother::Process(const Frame& frame) {
     m = f.motions.NoiseColumns(&internal::Motions::Step::m, f.size(), work);
   forward_frames_.push_back(
       {equations_->frame(), f.state.values(), f.state.covariance().Dense(), m, f.report});
-  forward_frames_.back().report.events.clear();  // Process has reported them already
+  forward_frames_.back().report.events.clear();  // Process returns these events in its report
   return f.report;
 }
 
@@ -152,8 +153,8 @@ void RtsSmoother::Smooth(const Emit& emit) {
   std::vector<Event> events;
   State smoothed = state();
   for (auto frame = forward_frames_.rbegin(); frame != forward_frames_.rend(); ++frame) {
-    const Eigen::Index noises =
-        lambda.size() - n;                 // number of elements of w, if the interval continues
+    // Number of elements of w if the interval continues, else 0.
+    const Eigen::Index noises = lambda.size() - n;
     Eigen::MatrixXd joint(n, n + noises);  // Cov(x, (x, w))
     joint.leftCols(n) = frame->p;
     joint.rightCols(noises) = frame->m.leftCols(noises);

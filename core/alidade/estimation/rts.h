@@ -30,7 +30,7 @@ class RecordingEquations;
 /// w), and [F G Lq; 0 I] replaces F. At the start of the interval, the elements of w are removed
 /// from lambda and Lambda.
 ///
-/// Jacobians, R and robust weights are those of the forward pass.
+/// The backward pass uses the Jacobians, R and robust weights of the forward pass.
 ///
 /// Source       [Rauch1965]; [Bierman1977] ch. X, modified Bryson-Frazier.
 class RtsSmoother : public Estimator {
@@ -39,8 +39,8 @@ class RtsSmoother : public Estimator {
   /// `jacobian_at: measurement`, rejection recovery, or landmarks.
   static constexpr EstimatorCapabilities kCapabilities = {};
 
-  /// `options.rejection_recovery` is ignored: there is no recovery. Throws Error kBadConfig if
-  /// `problem` needs more than kCapabilities.
+  /// `options.rejection_recovery` is ignored, because the smoother does not support recovery.
+  /// Throws Error kBadConfig if `problem` needs more than kCapabilities.
   RtsSmoother(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams);
   explicit RtsSmoother(const Problem& problem, const EkfOptions& options = {})
       : RtsSmoother(problem, options, problem.streams) {}
@@ -49,8 +49,9 @@ class RtsSmoother : public Estimator {
   void Start(Timestamp timestamp) override;
   const UpdateReport& Process(const Frame& frame) override;
   bool offline() const override { return true; }
-  /// The reports are those of the forward pass. If rounding makes a smoothed variance of a frame
-  /// negative, the covariance of the forward pass replaces the smoothed one (event `not_pd`).
+  /// Passes the reports of the forward pass to `emit`. If rounding makes a smoothed variance of a
+  /// frame negative, the covariance of the forward pass replaces the smoothed covariance (event
+  /// `not_pd`).
   void Smooth(const Emit& emit) override;
   const State& state() const override;
   Timestamp timestamp() const override;

@@ -4,12 +4,12 @@
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/problem_index.h"
 
-/// Evaluation of sensor models at a value x of the whole state, such as an estimate, a sigma point
-/// or an iterate. m: tangent size of the measurement.
+/// Functions that evaluate sensor models at a value x of the whole state, such as an estimate, a
+/// sigma point or an iterate. m: tangent size of the measurement.
 namespace alidade::internal {
 
-/// Sets the pointers to the values of the roles of a sensor. Known roles point into `known_roles`,
-/// the other ones into x. The pointer of a role without a block is null.
+/// Sets the pointers to the values of the roles of a sensor. The pointers of known roles point into
+/// `known_roles`. The pointers of other roles point into x, or are null if the role has no block.
 void RolesAt(const SensorPlace& place, const double* x, const double* known_roles, Roles& roles);
 
 /// Destinations of an evaluation, row-major. A quantity is not computed if its pointer is null.
@@ -39,7 +39,7 @@ inline void Square(const double* l, int m, double* r) {
 }
 
 /// Computes R, m x m, row-major, at the values of the roles. If the measurement has a covariance,
-/// copies it to R instead. `l` is temporary memory of the same size.
+/// copies the covariance to R instead. `l` is temporary memory with the size of R.
 Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measurement& measurement,
                 const double* const* roles, double* l, double* r);
 

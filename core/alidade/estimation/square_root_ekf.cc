@@ -15,7 +15,7 @@ namespace alidade {
 namespace internal {
 namespace {
 
-/// Computes the factor R of A = Q R, for A of m x n, m >= n. Writes R to the upper triangle of the
+/// Computes the factor R of A = Q R. A is m x n, m >= n. Writes R to the upper triangle of the
 /// first n rows of A. All other elements of A are then unspecified. `work` is memory for n numbers.
 void Triangularise(Eigen::Ref<Eigen::MatrixXd> a, double* work) {
   for (Eigen::Index k = 0; k < a.cols(); ++k) {
@@ -41,8 +41,8 @@ void ComputeRoot(FilterState& f, const Workspace::Matrix& a, const Workspace::Ma
   root = tall.topRows(n).transpose();
 }
 
-/// Equations of SquareRootEkf. Uses the Jacobians of EkfEquations, stores a root of P, and computes
-/// P from the root.
+/// Equations of SquareRootEkf. The class uses the Jacobians of EkfEquations, stores a root of P,
+/// and computes P from the root.
 class SquareRootEquations : public UpdateMethod {
  public:
   std::unique_ptr<UpdateMethod> Clone() const override {
@@ -131,8 +131,8 @@ Outcome SquareRootEquations::Correct(FilterState& f, std::span<PendingMeasuremen
   const Workspace::Use use(f.work);
   const StackedMeasurements stacked = Stack(f, rows);
   const Eigen::Index n = root_.rows(), m = stacked.h.rows();
-  Workspace::Matrix array = f.work.Take(m + n, m + n),
-                    hl = f.work.Take(m, n);  // the transposed array, and H L
+  // `array` is the transposed array of the update. `hl` is H L.
+  Workspace::Matrix array = f.work.Take(m + n, m + n), hl = f.work.Take(m, n);
   array.setZero();
   Eigen::Index offset = 0;
   for (const PendingMeasurement* pending : rows) {

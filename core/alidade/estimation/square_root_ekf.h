@@ -21,8 +21,8 @@ namespace alidade {
 ///             S = Ls Ls',  dx = W Ls^-1 r,  K = W Ls^-1
 ///
 /// For discrete noise w, which is constant over an interval, the filter stores M = Cov(x, w) and
-/// the root B of P - M M'. Each step computes M <- F M + G Lq, and B from F B and the continuous
-/// noise as above. L is the triangular factor of [B M].
+/// the root B of P - M M'. Each step computes M <- F M + G Lq. B is computed by the prediction
+/// equation above, from F B and the continuous noise. L is the triangular factor of [B M].
 ///
 /// Jacobians and robust weights are computed as in Ekf. The complexity of an update is O((m +
 /// n)^3).
@@ -34,13 +34,13 @@ class SquareRootEkf : public Filter {
   /// `jacobian_at: measurement`, rejection recovery, or landmarks.
   static constexpr EstimatorCapabilities kCapabilities = {};
 
-  /// `options.rejection_recovery` is ignored: there is no recovery. Throws Error kBadConfig if
-  /// `problem` needs more than kCapabilities.
+  /// `options.rejection_recovery` is ignored, because the filter does not support recovery. Throws
+  /// Error kBadConfig if `problem` needs more than kCapabilities.
   SquareRootEkf(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams);
   explicit SquareRootEkf(const Problem& problem, const EkfOptions& options = {})
       : SquareRootEkf(problem, options, problem.streams) {}
 
-  /// Returns L, n x n. ContractViolation if a filter of another type was assigned to this one.
+  /// Returns L, n x n. ContractViolation if a filter of another type was assigned to this filter.
   /// state().covariance() is L L' in double precision and has half as many correct digits as L.
   const Eigen::MatrixXd& root() const;
 };

@@ -13,8 +13,8 @@ namespace alidade::internal {
 /// Returns m.
 int TotalDof(std::span<PendingMeasurement* const> rows);
 
-/// Returns whether the gain of a measurement is reported. The gain is not reported for sensors of
-/// landmarks, because their blocks are added and removed during a run.
+/// Returns whether the gain of a measurement is reported. The gain is not reported for measurements
+/// of landmarks, because the blocks of landmarks are added and removed during a run.
 inline bool GainIsRecorded(const PendingMeasurement& pending) {
   return !pending.place->has_landmark;
 }
@@ -48,13 +48,14 @@ struct StackedMeasurements {
 
 /// Returns the stacked H, R and innovation, stored in f.work.
 StackedMeasurements Stack(FilterState& f, std::span<PendingMeasurement* const> rows);
-/// Each of these returns only H, only R or only the innovation, stored in f.work.
+/// The next three functions return the stacked H, the stacked R, and the stacked innovation. They
+/// store the results in f.work.
 Workspace::Matrix JacobianOf(FilterState& f, std::span<PendingMeasurement* const> rows);
 Workspace::Matrix NoiseOf(FilterState& f, std::span<PendingMeasurement* const> rows);
 Workspace::Vector InnovationOf(FilterState& f, std::span<PendingMeasurement* const> rows);
-/// Calls zero(offset, size, column, count) for each part of the gain that is zero because of a
-/// consider block or role. The part has the rows [offset, offset + size) of P and the columns
-/// [column, column + count) of the update.
+/// Calls zero(offset, size, column, count) for each part of the gain that is zero because a block
+/// or role is a consider state. The part consists of the rows [offset, offset + size) of P and the
+/// columns [column, column + count) of the update.
 template <class Zero>
 void ForEachConsidered(const FilterState& f, std::span<PendingMeasurement* const> rows,
                        const Zero& zero) {

@@ -12,8 +12,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Motion model that changes blocks of a sensor. In the new roles, its blocks are the `count` roles
-/// from `first` on.
+/// Motion model that changes blocks of a sensor. Its blocks fill `count` roles of the OffsetSensor,
+/// from the role `first` on.
 struct Mover {
   SharedMotion model;
   int first, count;
@@ -42,7 +42,7 @@ class OffsetSensor final : public SensorModel {
   }
 
  private:
-  /// Temporary memory of a call. Later calls in the same thread reuse it.
+  /// Temporary memory of a call. Later calls in the same thread reuse the memory.
   struct Memory {
     std::vector<double> next, f, g, rate;  ///< x(t + delta), F, G, df/ddelta of all movers
     std::vector<double> shifted, jacobian;
@@ -74,8 +74,8 @@ class OffsetSensor final : public SensorModel {
     return description;
   }
 
-  /// Computes x' of one mover after dt_s, block after block. Also computes F, unless its pointer is
-  /// null.
+  /// Computes x' of one mover after dt_s, as the concatenated values of its blocks. Also computes F
+  /// if `f` is not null.
   static Status Move(const Mover& mover, const double* const* x, double dt_s, double* next,
                      Memory& memory, double* f) {
     std::array<double*, kMaxRoles> destinations;
@@ -102,7 +102,7 @@ class OffsetSensor final : public SensorModel {
     return status;
   }
 
-  /// Computes df/ddelta of one mover at x' = next, in the tangent space.
+  /// Computes df/ddelta of one mover, in the tangent space at x' = next.
   static Status Differentiate(const Mover& mover, const double* const* x, double dt_s,
                               const double* next, Memory& memory, double* rate) {
     constexpr double kStep = 1e-3;
@@ -128,8 +128,8 @@ class OffsetSensor final : public SensorModel {
     return Status::kOk;
   }
 
-  /// Computes the values of the sensor's roles at t + delta, and points memory.roles to them. If
-  /// `derivatives` is true, also computes F and df/ddelta.
+  /// Computes the values of the sensor's roles at t + delta. The pointers memory.roles then point
+  /// to these values. If `derivatives` is true, also computes F and df/ddelta.
   Status Shift(const double* const* roles, bool derivatives, Memory& memory) const {
     memory.next.resize(ambient_);
     memory.shifted.resize(ambient_);
@@ -171,8 +171,8 @@ class OffsetSensor final : public SensorModel {
   }
 
   /// Sets the destinations of the Jacobians of the sensor, which have m rows. Jacobians of roles
-  /// that do not move are written to the destinations of the caller. Those of roles that move are
-  /// written to temporary memory.
+  /// that do not move are written to the destinations of the caller. Jacobians of roles that move
+  /// are written to temporary memory.
   void SetJacobianDestinations(int m, double* const* jacobians, const int* strides,
                                Memory& memory) const {
     std::size_t size = 0;
@@ -197,7 +197,7 @@ class OffsetSensor final : public SensorModel {
   }
 
   /// Computes J_c = sum_i J_i F_ic for the blocks c of all movers, and J_delta = sum_i J_i
-  /// df_i/ddelta. J_i, with m rows, are the Jacobians of the roles i that move.
+  /// df_i/ddelta. J_i, which has m rows, is the Jacobian of a role i that moves.
   void Chain(int m, double* const* jacobians, const int* strides, const Memory& memory) const {
     const auto output = [&](int role, int columns) {
       return Eigen::Map<RowMajor, 0, Eigen::OuterStride<>>(jacobians[role], m, columns,
@@ -286,18 +286,18 @@ class OffsetSensor final : public SensorModel {
   std::vector<Mover> movers_;
   std::vector<int> role_map_;  ///< by role of the sensor: role of this model; -1: no block
   int offset_;
-  std::size_t ambient_ = 0, tangent_ = 0, square_ = 0,
-              noise_ = 1;  ///< sizes of the arrays in Memory
+  /// Sizes of the arrays in Memory.
+  std::size_t ambient_ = 0, tangent_ = 0, square_ = 0, noise_ = 1;
 };
 
 /// Roles of an OffsetSensor: the roles of a sensor, and the blocks of the motion models that move
-/// them.
+/// these roles.
 struct Arrangement {
   std::vector<Mover> movers;
   std::vector<Space> roles;
   std::vector<RoleBinding> bindings;
   std::vector<int> role_map;  ///< by role of the sensor: index into `roles`, or -1
-  int offset = -1;            ///< index of the role of delta
+  int offset = -1;            ///< index of the role that delta fills
 
   /// Appends a role and returns its index.
   int Add(Space space, RoleBinding binding, const std::string& name) {
@@ -327,8 +327,8 @@ Arrangement Arrange(const Problem& problem, BlockId offset, const SensorBinding&
                                   static_cast<int>(arrangement.roles.size()),
                                   static_cast<int>(motion.blocks.size()),
                                   {}});
-    // Blocks of the motion model that fill no role of the sensor get the mode of the first role
-    // that the model moves.
+    // Blocks of the motion model that do not fill a role of the sensor have the mode of the first
+    // role that the model moves.
     const auto moved =
         std::ranges::find_if(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
     const RoleMode mode = sensor.roles[static_cast<std::size_t>(role_of(*moved))].mode;
@@ -371,7 +371,7 @@ std::string OffsetInTime(const Problem& problem, BlockId offset, SensorBinding& 
   Arrangement arrangement = Arrange(problem, offset, sensor, *sensor.model);
   for (const Mover& mover : arrangement.movers) {
     if (mover.model->has_input()) {
-      return "motion model '" + mover.model->name() +
+      return "the motion model '" + mover.model->name() +
              "', which changes blocks of this sensor, has a control input";
     }
   }

@@ -14,7 +14,7 @@ namespace {
 
 constexpr Timestamp kForever = std::numeric_limits<Timestamp>::max();
 
-/// Returns timeout_s in whole nanoseconds, at least one.
+/// Returns timeout_s in whole nanoseconds, at least 1 ns.
 Timestamp TimeoutOf(double timeout_s) {
   constexpr double kLimit_s = 9.2e9;  // longer times would overflow a Timestamp
   return timeout_s < kLimit_s ? std::max<Timestamp>(1, TimestampFromSeconds(timeout_s)) : kForever;
@@ -22,12 +22,12 @@ Timestamp TimeoutOf(double timeout_s) {
 
 /// Returns the reason why an input cannot be used, or "" if it can be used.
 std::string Defect(const Geometry& geometry, const std::vector<double>& value) {
-  if (!AllFinite(value)) return "not finite";
-  if (DistanceFrom(geometry, value.data()) > kUnitTolerance) return "not of unit length";
+  if (!AllFinite(value)) return "is not finite";
+  if (DistanceFrom(geometry, value.data()) > kUnitTolerance) return "does not have unit length";
   return {};
 }
 
-/// Returns max_dt_s in whole nanoseconds, at least one.
+/// Returns max_dt_s in whole nanoseconds, at least 1 ns.
 Timestamp MaxStep(double max_dt_s) {
   constexpr double kLimit_ns = 9.2e18;  // longer times would overflow a Timestamp
   const double ns = std::round(1e9 * max_dt_s);
@@ -63,8 +63,8 @@ StepError Timeline::NextSubStep(Timestamp start, Timestamp end, std::vector<Even
   constexpr Timestamp kMaxSteps = 1'000'000;
   sub_step.start = start;
   sub_step.end = end;
-  for (const StoredInput& input :
-       inputs_) {  // u changes when an input expires, so the sub-step ends then
+  // u changes when an input expires, so the sub-step ends at that time.
+  for (const StoredInput& input : inputs_) {
     if (IsActive(input, start)) sub_step.end = std::min(sub_step.end, input.expiration);
   }
   Timestamp elapsed = 0;
@@ -74,7 +74,7 @@ StepError Timeline::NextSubStep(Timestamp start, Timestamp end, std::vector<Even
     return {EventKind::kTooManySubsteps,
             "a gap of " + RoundedText(Seconds(sub_step.end) - Seconds(start)) +
                 " s would need more than " + RoundedText(static_cast<double>(kMaxSteps)) +
-                " steps of " + RoundedText(max_dt_s_) + " s"};
+                " steps of " + RoundedText(max_dt_s_) + " s; increase max_dt_s"};
   }
   sub_step.dt_s = Seconds(elapsed);
   if (sub_step.steps > 1) sub_step.dt_s /= static_cast<double>(sub_step.steps);
@@ -131,7 +131,7 @@ void Timeline::UseInputs(Timestamp start, Motions& motions, std::vector<Event>& 
       if (!defect.empty() && !input.refusal_reported) {
         report.events.push_back({frame.timestamp, EventKind::kInputRefused,
                                  "a control input of '" + input.name + "' from stream '" +
-                                     input.binding.stream + "' is " + defect +
+                                     input.binding.stream + "' " + defect +
                                      ": the previous input remains in use"});
       }
       input.refusal_reported = !defect.empty();

@@ -44,26 +44,26 @@ class Timeline {
 
   /// Returns the time of the priors: initial_time_s, or else the timestamp of the first frame.
   Timestamp StartFor(const Frame& first) const { return start_.value_or(first.timestamp); }
-  /// Computes the sub-step from `start` towards `end`, which must be later. If the sub-step has at
-  /// least twice as many steps as any earlier one, reports it by the event `substeps`. Returns an
-  /// error if the sub-step would need too many steps.
+  /// Computes the sub-step from `start` towards `end`, which must be later. The event `substeps`
+  /// reports a sub-step that has at least twice as many steps as every sub-step reported before.
+  /// Returns an error if the sub-step would need too many steps.
   StepError NextSubStep(Timestamp start, Timestamp end, std::vector<Event>& events,
                         SubStep& sub_step);
 
   /// Returns whether any motion model has a control input.
   bool has_inputs() const { return !inputs_.empty(); }
   /// Returns u (ambient) of Problem::motions[motion] during the sub-step that starts at `start`, or
-  /// an empty span if the model has no control input. If no input acts, the event `input_stale`
-  /// reports this once, until an input acts again. The span is valid until the next TakeInputs.
+  /// an empty span if the model has no control input. The event `input_stale` reports the first
+  /// sub-step in which no input acts. The span is valid until the next TakeInputs.
   std::span<const double> Input(std::size_t motion, Timestamp start, std::vector<Event>& events);
   /// Sets the control inputs of the active models in `motions`, for the sub-step that starts at
   /// `start`.
   void UseInputs(Timestamp start, Motions& motions, std::vector<Event>& events);
-  /// Stores the control inputs of a frame, which act from its timestamp on, and appends the indices
-  /// of their motion models to `report.inputs`. An input that is older than the stored one is
-  /// ignored. An input that is not finite, or not of unit length, is rejected. The event
-  /// `input_refused` reports this once, until an input is accepted again. The covariance of an
-  /// input is not used, because its noise is defined by the model.
+  /// Stores the control inputs of a frame, which act from the timestamp of the frame on. Appends
+  /// the indices of their motion models to `report.inputs`. An input that is older than the stored
+  /// input is ignored. An input that is not finite, or does not have the required unit length, is
+  /// rejected. The event `input_refused` reports only the first of consecutive rejections. The
+  /// covariance of an input is not used, because the model defines the noise of the input.
   void TakeInputs(const Frame& frame, UpdateReport& report);
 
  private:
@@ -73,17 +73,17 @@ class Timeline {
     std::string name;  ///< name of the state entry
     InputBinding binding;
     Geometry geometry;
-    int stream = -1;  ///< -1: the source has no stream of that name
+    int stream = -1;  ///< index of the stream; -1: the source does not have this stream
     Timestamp timeout = 0;
     std::vector<double> value, neutral;
     Timestamp timestamp = kNoTimestamp;   ///< timestamp of `value`
-    Timestamp expiration = kNoTimestamp;  ///< time from which on `value` no longer acts
+    Timestamp expiration = kNoTimestamp;  ///< time at which `value` stops acting
     bool stale_reported = false, refusal_reported = false;
   };
   static bool IsActive(const StoredInput& input, Timestamp time) { return time < input.expiration; }
   static std::string DescribeMissing(const StoredInput& input);
 
-  std::vector<StoredInput> inputs_;  ///< one for each model with a control input
+  std::vector<StoredInput> inputs_;  ///< one element for each model with a control input
   std::optional<Timestamp> start_;
   double max_dt_s_;
   Timestamp max_dt_;                  ///< max_dt_s in whole ns, at least 1 ns

@@ -21,9 +21,8 @@ namespace {
 
 /// Computes the mean of `centre` and the columns y_i of `points`. Writes f_i = (y_i (-) mean) -
 /// (centre (-) mean) to `f` (tangent x 2N), and computes m = w sum f_i. The iteration has converged
-/// if its step is at most the rounding error: 16 eps for each of the 2N f_i, and for the centre in
-/// each f_i. Returns false if the points are too far apart, so that the iteration does not
-/// converge.
+/// if its step is at most 16 eps (1 + 2 N w) max(1, max_j |centre_j|), the rounding error. Returns
+/// false if the iteration does not converge, because the points are too far apart.
 bool MeanOf(const Geometry& geometry, const double* centre,
             const Eigen::Ref<const Eigen::MatrixXd>& points, double w, Workspace& work,
             double* mean, Eigen::Ref<Eigen::MatrixXd> f, Eigen::Ref<Eigen::VectorXd> m) {
@@ -90,7 +89,7 @@ class UkfEquations : public UpdateMethod {
   struct SigmaPrediction {
     int halvings = 0;                       ///< number of times that the spread was halved
     std::vector<double> centre;             ///< h(x0)
-    std::vector<double> h, innovation;      ///< the mean h, and z (-) h
+    std::vector<double> h, innovation;      ///< mean of h, and z minus this mean
     std::vector<double> deviations, shift;  ///< f_i (tangent x 2n, column by column), and m
 
     Workspace::Matrix f() {
@@ -135,8 +134,9 @@ Transform UkfEquations::TransformOf(Eigen::Index directions, int halvings) const
   return {std::sqrt(c2), 0.5 / c2, options_.beta - alpha * alpha};
 }
 
-/// Calls attempt(halvings) with a spread that is halved each time. Stops when no point is out of
-/// domain, or alpha has reached its minimum. Returns the last outcome and sets `halvings`.
+/// Calls attempt(halvings) for halvings = 0, 1, ..., which halves the spread each time. Stops when
+/// the outcome is not kOutOfDomain, or when alpha would fall below its minimum. Returns the last
+/// outcome.
 template <class Attempt>
 Outcome UkfEquations::ReduceSpread(int& halvings, const Attempt& attempt) const {
   for (halvings = 0;; ++halvings) {
@@ -163,7 +163,7 @@ const Eigen::MatrixXd& UkfEquations::RootOf(FilterState& f) {
   return root_;
 }
 
-/// Returns B with P - M M' = B B', the covariance of x for a given discrete noise. Negative pivots
+/// Returns B with B B' = P - M M', the covariance of x given the discrete noise. Negative pivots
 /// can only be rounding errors, because P includes M M'.
 const Eigen::MatrixXd& UkfEquations::ConditionalRootOf(const FilterState& f) {
   conditional_covariance_ = f.state.covariance().lower();  // only the lower triangle is used
@@ -188,9 +188,9 @@ void UkfEquations::UpdateNoiseCross(FilterState& f, const Workspace::Matrix& dev
   }
 }
 
-/// Reports once that the spread was reduced, for the sensor `index`. The index after the last
-/// sensor stands for the motion models. `is_sufficient`: whether the points with the reduced spread
-/// can be used.
+/// Reports once that the spread was reduced for a sensor or for the motion models. `index` is the
+/// index of the sensor; the number of sensors denotes the motion models. `is_sufficient` is true if
+/// the points with the reduced spread can be used.
 void UkfEquations::ReportGuard(FilterState& f, std::size_t index, int halvings,
                                bool is_sufficient) {
   const bool is_guarded = halvings > 0 || !is_sufficient;
@@ -200,7 +200,7 @@ void UkfEquations::ReportGuard(FilterState& f, std::size_t index, int halvings,
             ? "sensor '" + f.problem_index->problem.sensors[index].name + "'"
             : "motion models";
     AddEvent(f, EventKind::kGuarded,
-             subject + ": sigma points are out of domain or have no mean" +
+             subject + ": sigma points are outside the domain or have no mean" +
                  (is_sufficient ? "" : ", even with the smallest spread") +
                  "; their spread is divided by " + std::to_string(1 << halvings));
   }
@@ -237,7 +237,8 @@ Outcome UkfEquations::StepPoint(FilterState& f, const double* point, const doubl
   return Outcome::kAccepted;
 }
 
-/// Propagates state and covariance. If a sigma point is out of domain, both are unchanged.
+/// Propagates the state and the covariance. If the outcome is not kAccepted, state and covariance
+/// are unchanged.
 Outcome UkfEquations::StepPoints(FilterState& f, int halvings, double dt_s) {
   const Workspace::Use use(f.work);
   const bool continues_interval = f.motions.in_interval();
@@ -302,11 +303,11 @@ StepError UkfEquations::Step(FilterState& f, double dt_s) {
   }
   if (outcome == Outcome::kFailed) {
     return {EventKind::kPluginFailed,
-            "motion model of '" + failed_motion_->name +
+            "the motion model of '" + failed_motion_->name +
                 "' failed at a sigma point: " + failed_motion_->model->error_text()};
   }
   return {EventKind::kDiverged,
-          "the motion models cannot predict the sigma points, even with a spread divided by " +
+          "the motion models cannot predict the sigma points, even if their spread is divided by " +
               std::to_string(1 << halvings)};
 }
 
@@ -360,7 +361,7 @@ Outcome UkfEquations::Predict(FilterState& f, PendingMeasurement& pending) {
     std::ranges::copy(prediction.innovation, pending.innovation);
     pending.report->h = {pending.h, prediction.h.size()};
     pending.report->innovation = {pending.innovation, prediction.innovation.size()};
-    pending.H.clear();  // the UKF computes no Jacobian
+    pending.H.clear();  // the UKF does not compute a Jacobian
   } else if (!is_too_wide) {
     ReportRefusal(f, pending, outcome);
   }
@@ -389,8 +390,8 @@ Outcome UkfEquations::StackPoints(FilterState& f, std::span<PendingMeasurement* 
     SigmaPrediction& prediction = PredictionOf(f, *pending);
     if (prediction.halvings < halvings) {
       const Outcome outcome = PredictPoints(f, *pending, halvings);
-      if (outcome !=
-          Outcome::kAccepted) {  // this is not a divergence, because h is defined at the estimate
+      if (outcome != Outcome::kAccepted) {
+        // This failure is not a divergence, because h is defined at the estimate.
         if (outcome == Outcome::kFailed) ReportPluginFailure(f, *pending);
         pending->report->outcome = outcome;
         return Outcome::kNotFinite;
@@ -411,7 +412,7 @@ Outcome UkfEquations::Correct(FilterState& f, std::span<PendingMeasurement* cons
   const Workspace::Use use(f.work);
   const Eigen::MatrixXd& root = RootOf(f);
   const Eigen::Index n = root.cols(), m = TotalDof(rows);
-  int halvings = 0;  // halvings of the smallest spread
+  int halvings = 0;  // number of halvings of the smallest spread
   for (const PendingMeasurement* pending : rows) {
     halvings = std::max(halvings, PredictionOf(f, *pending).halvings);
   }
@@ -426,7 +427,7 @@ Outcome UkfEquations::Correct(FilterState& f, std::span<PendingMeasurement* cons
   MomentsOf(transform, stacked.h, mean, s);
   s += stacked.noise;
   if (!Factorise(s)) return Outcome::kNotPd;
-  if (n == 0) return Outcome::kAccepted;  // no state to correct
+  if (n == 0) return Outcome::kAccepted;  // there is no state to correct
   deviations.leftCols(n) = transform.c * root;
   deviations.rightCols(n) = -transform.c * root;
   gain.setZero();
@@ -465,7 +466,7 @@ Ukf::Ukf(Problem problem, const UkfOptions& options, const std::vector<StreamInf
              internal::WithoutRecovery(options.filter), streams,
              std::make_unique<internal::UkfEquations>(options)) {
   internal::ExpectOption(options.alpha >= UkfOptions::kMinAlpha && options.alpha <= 1.0, "alpha",
-                         options.alpha, "UkfOptions::kMinAlpha to 1");
+                         options.alpha, "a number from UkfOptions::kMinAlpha to 1");
   internal::ExpectOption(options.beta >= 0.0, "beta", options.beta, "at least 0");
   internal::ExpectOption(options.kappa >= 0.0, "kappa", options.kappa, "at least 0");
 }

@@ -10,14 +10,14 @@ namespace alidade {
 
 /// Options of Ukf.
 struct UkfOptions {
-  /// Minimum of alpha. The rounding error of a mean of values y is eps |y| / (2 alpha^2), so 1e-8
-  /// |y| at the minimum.
+  /// Minimum of alpha. The rounding error of a mean of values y is eps |y| / (2 alpha^2), which is
+  /// about 1e-8 |y| at the minimum.
   static constexpr double kMinAlpha = 1e-4;
 
-  EkfOptions filter;    ///< gate, fuse and max_dt_s; `rejection_recovery` is ignored
+  EkfOptions filter;    ///< `jacobian` and `rejection_recovery` are ignored
   double alpha = 0.01;  ///< spread of the sigma points, in [1e-4, 1]
   double beta = 2.0;  ///< weight of the centre in the covariance, >= 0; 2 is optimal for a Gaussian
-  double kappa = 0.0;  ///< added to N, the number of directions, in the spread; >= 0
+  double kappa = 0.0;  ///< parameter of the spread c^2 = alpha^2 (N + kappa); >= 0
 };
 
 /// Unscented Kalman filter: computes the moments of y = g(x), x ~ N(x0, A A'), from 2N + 1 sigma
@@ -36,16 +36,16 @@ struct UkfOptions {
 /// with Cov(x, w) = M. Their directions are (b_i, 0), with B B' = P - M M', and (m_j, e_j).
 ///
 /// In an update, S = Cov(h) + R and K = Cov(x, h) S^-1, with R evaluated at x0. The new P is Cov(x
-/// - K h) + K R K', computed with dx_i - K f_i instead of f_i. If beta >= alpha^2, this is a sum of
-/// squares. If the sensor has a robust loss, R / w replaces R. A joint update uses the smallest
-/// spread among its measurements. The reported h, S and NIS are those that the gate used.
+/// - K h) + K R K', computed with dx_i - K f_i instead of f_i. If beta >= alpha^2, the new P is a
+/// sum of squares. If the sensor has a robust loss, R / w replaces R. A joint update uses the
+/// smallest spread of its measurements. The reported h, S and NIS are those that the gate used.
 ///
-/// Sigma points may be out of domain although the model is defined at x0, or too far apart on a
-/// manifold to have a mean. The spread is then halved until neither occurs (event `guarded`).
-/// Halving stops before alpha falls below UkfOptions::kMinAlpha. If the smallest spread is still
-/// too large, a measurement is out of domain, and a step ends the filter. If h is not defined at
-/// x0, the measurement is out of domain. If P is not positive semi-definite, negative pivots are
-/// set to zero (event `repaired`).
+/// Sigma points may be out of domain although the model is defined at x0. On a manifold, they may
+/// also be too far apart to have a mean. In both cases the spread is halved until the points can be
+/// used (event `guarded`). Halving stops before alpha falls below UkfOptions::kMinAlpha. If the
+/// smallest spread is still too large, the outcome of a measurement is kOutOfDomain, and a step
+/// ends the filter. If h is not defined at x0, the outcome is also kOutOfDomain. If P is not
+/// positive semi-definite, negative pivots are set to zero (event `repaired`).
 ///
 /// Source       [Julier2004]; [Wan2000] alpha, beta, kappa.
 class Ukf : public Filter {

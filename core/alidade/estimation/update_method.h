@@ -8,17 +8,17 @@
 
 namespace alidade::internal {
 
-/// Equations of one type of Kalman filter: propagate x and P, predict a measurement, correct x and
-/// P by measurements. Independent of gates and frames.
+/// Equations of one type of Kalman filter, which propagate x and P, predict a measurement, and
+/// correct x and P by measurements. The equations are independent of gates and frames.
 class UpdateMethod {
  public:
   virtual ~UpdateMethod() = default;
-  /// Returns a copy of the method that shares no data with it.
+  /// Returns a copy that shares no data with this object.
   virtual std::unique_ptr<UpdateMethod> Clone() const = 0;
 
   /// Returns the square root of P if the method stores one, else null.
   virtual const Eigen::MatrixXd* Root() const { return nullptr; }
-  /// Called once, before the first frame, with the initial x and P.
+  /// Prepares the method for the initial x and P. Must be called once, before the first frame.
   virtual void Begin(FilterState& /*f*/) {}
   /// Propagates x and P by dt_s. If this fails, returns the error and leaves x and P unchanged.
   virtual StepError Step(FilterState& f, double dt_s) = 0;
@@ -29,13 +29,14 @@ class UpdateMethod {
   virtual Outcome Predict(FilterState& f, PendingMeasurement& pending) = 0;
   /// Computes S of a measurement that Predict accepted, and writes S to the report. Returns the
   /// NIS, or NaN if S is not finite or not positive definite. The measurement uses the columns of
-  /// the update from linearised.column on, after the columns of the measurements accepted before.
+  /// the update from linearised.column on. The columns before belong to measurements that were
+  /// accepted earlier.
   virtual double ComputeNis(FilterState& f, PendingMeasurement& pending) = 0;
   /// Corrects x and P by one stacked update, in the order of the calls of ComputeNis. R and S
   /// include the robust weights. If the update succeeds, writes the gains to the reports
   /// (RecordGain) and returns kAccepted. Otherwise leaves x and P unchanged and returns the reason.
-  /// Also reports the reason as an event, unless it is kNotPd or kNotFinite. The report of the
-  /// measurement that caused the failure may contain another outcome.
+  /// Also reports the reason as an event, unless the reason is kNotPd or kNotFinite. The report of
+  /// the measurement that caused the failure may contain another outcome.
   virtual Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) = 0;
 };
 

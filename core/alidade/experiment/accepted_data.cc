@@ -7,8 +7,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns for each measurement of a sensor whether the estimator used it. The order is that of the
-/// frame and the report.
+/// Returns whether the estimator used each measurement of a sensor. The measurements have the same
+/// order in the result, the frame and the report.
 std::vector<bool> UsedMeasurements(int sensor, const UpdateReport& report) {
   std::vector<bool> used;
   for (const MeasurementReport& entry : report.measurements()) {
@@ -23,7 +23,7 @@ std::vector<bool> UsedMeasurements(int sensor, const UpdateReport& report) {
 Frame AcceptedMeasurements(const Frame& frame, const std::vector<StreamInfo>& streams,
                            const Problem& problem, const UpdateReport& report) {
   Frame accepted{frame.timestamp, {}};
-  // Nullopt: no sensor reads the stream.
+  // An element is nullopt if no sensor reads the stream.
   std::vector<std::optional<std::vector<bool>>> used(streams.size());
   for (int sensor = 0; sensor < std::ssize(problem.sensors); ++sensor) {
     const std::string& stream = problem.sensors[static_cast<std::size_t>(sensor)].stream;

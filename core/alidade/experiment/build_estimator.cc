@@ -26,7 +26,7 @@ const EstimatorCapabilities& CapabilitiesOf(const PluginEntry& entry) {
 }
 
 /// Returns the index of the stream that the entry of a sensor or an input names. The size of the
-/// stream must be `size`. If it is not, the error message contains `wanted_by` as the reason.
+/// stream must be `size`, which is the size of the quantity `wanted_by`.
 int FindStreamOf(const Node& entry, int size, const std::string& wanted_by,
                  const std::vector<StreamInfo>& streams) {
   const Node node = entry.At("stream");
@@ -39,8 +39,8 @@ int FindStreamOf(const Node& entry, int size, const std::string& wanted_by,
   const auto index = static_cast<std::size_t>(found - names.begin());
   if (streams[index].size != size) {
     node.Fail("stream '" + names[index] + "' has " + std::to_string(streams[index].size) +
-                  " values at a time",
-              std::to_string(size) + ", as " + wanted_by);
+                  (streams[index].size == 1 ? " value" : " values") + " per measurement",
+              std::to_string(size) + ", the size of " + wanted_by);
   }
   return static_cast<int>(index);
 }
@@ -56,22 +56,24 @@ std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
   for (const Node& item : list->Items()) {
     const std::string name = item.Text();
     if (std::find(known_names.begin(), known_names.end(), name) == known_names.end()) {
-      item.Fail("no sensor '" + name + "'", "a name from `sensors`", Nearest(name, known_names));
+      item.Fail("sensor '" + name + "' does not exist", "a name from `sensors`",
+                Nearest(name, known_names));
     }
     if (std::find(names.begin(), names.end(), name) != names.end()) {
-      item.Fail("sensor '" + name + "' is listed twice", "each sensor once");
+      item.Fail("sensor '" + name + "' is listed twice", "each sensor only once");
     }
     names.push_back(name);
   }
   if (names.empty())
-    list->Fail("empty", "at least one sensor, or the key left out to use all sensors");
+    list->Fail("the list is empty; add a sensor, or remove this key to use all sensors");
   return names;
 }
 
 void CheckName(const std::string& name, const Node& entry) {
   ExpectName(name, entry, "an estimator");
   if (name == "figures") {
-    entry.Fail("'figures' cannot name an estimator: the run folder uses this name", "another name");
+    entry.Fail("'figures' cannot name an estimator, because the run folder uses this name",
+               "another name");
   }
 }
 
@@ -84,19 +86,20 @@ void CheckName(const std::string& name, const Node& entry) {
   }
   std::vector<std::string> names = of_core;
   names.insert(names.end(), of_plugins.begin(), of_plugins.end());
-  const std::string expected = "a built-in type: " + Join(of_core) + ", or the type of a plugin: " +
-                               (of_plugins.empty() ? "none found" : Join(of_plugins));
+  const std::string expected = "a built-in type (" + Join(of_core) + ") or a type of a plugin (" +
+                               (of_plugins.empty() ? "none was found" : Join(of_plugins)) + ')';
   constexpr const char* kHint =
       "\n  batch estimators need a build with the Ceres solver: "
       "cmake --preset release && cmake --build --preset release";
   throw Error(ExitCode::kPlugin,
               ErrorLine(node.place(), node.path(),
-                        "no estimator type '" + name + "' is built in or offered by a plugin",
+                        "estimator type '" + name + "' is neither built in nor in a plugin",
                         expected, Nearest(name, names)) +
                   (of_plugins.empty() ? kHint : "") + "\n" + PluginPlaces(host));
 }
 
-/// Returns the entry of the estimator `type` of a plugin. Error: kPlugin if no plugin offers it.
+/// Returns the entry of the estimator `type` of a plugin. Error: kPlugin if no plugin provides this
+/// estimator.
 const PluginEntry& FindPluginEstimator(const std::string& type, const PluginHost& host,
                                        const Node& node) {
   for (const PluginEntry& entry : host.entries()) {
@@ -106,15 +109,15 @@ const PluginEntry& FindPluginEstimator(const std::string& type, const PluginHost
   FailUnknownType(type, host, node);
 }
 
-/// Rejects a problem that needs more than `capabilities`. The problem was read from the config
-/// `root`.
+/// Rejects a problem that needs a capability that `capabilities` does not contain. The problem was
+/// read from the config `root`.
 void RefuseUnsupported(const std::string& type, const EstimatorCapabilities& capabilities,
                        const Node& root, const Problem& problem) {
   const auto defect = FindUnsupported(problem, capabilities);
   if (!defect) return;
   FindDefectNode(*defect, root, problem)
       .Fail("estimator type '" + type + "' does not support " + defect->description,
-            defect->remedy + " (also by the estimator's `overrides`), or type: ekf");
+            defect->remedy + " (possibly in the estimator's `overrides`), or type: ekf");
 }
 
 /// Rejects keys that only other estimator types have. Must be called after the keys of this type
@@ -122,13 +125,13 @@ void RefuseUnsupported(const std::string& type, const EstimatorCapabilities& cap
 void RefuseUnsupportedKeys(const std::string& type, const Node& entry) {
   constexpr std::pair<const char*, const char*> kKeys[] = {
       {"gate", "gate"},
-      {"fuse", "choice of updates"},
-      {"jacobian", "choice of Jacobian"},
+      {"fuse", "option for the grouping of updates"},
+      {"jacobian", "option for the Jacobian"},
       {"rejection_recovery", "rejection recovery"}};
   for (const auto& [key, feature] : kKeys) {
     if (!entry.HasUnread(key)) continue;
-    entry.At(key).Fail("estimator type '" + type + "' has no " + feature,
-                       "the key left out, or type: ekf");
+    entry.At(key).Fail("estimator type '" + type + "' has no " + feature +
+                       "; remove this key, or use type: ekf");
   }
 }
 
@@ -151,7 +154,7 @@ void CheckOverrides(const Node& overrides, const Node& root, const Node& merged)
   for (const auto& [key, value] : overrides.Entries()) {
     if (key == "initial_time_s" || key == "landmarks") continue;
     if (key != "state" && key != "sensors") {
-      value.Fail("'" + key + "' is common to all estimators of a run",
+      value.Fail("an estimator cannot override '" + key + "', which all estimators of a run share",
                  "state, sensors, landmarks or initial_time_s");
     }
     std::vector<std::string> known_names;
@@ -159,7 +162,7 @@ void CheckOverrides(const Node& overrides, const Node& root, const Node& merged)
     for (const auto& [name, entry] : value.Entries()) {
       if (std::ranges::find(known_names, name) != known_names.end()) continue;
       if (merged.At(key).At(name).Find("model")) continue;
-      entry.Fail("no entry '" + name + "' in '" + key + "' to override",
+      entry.Fail("'" + key + "' has no entry '" + name + "' to override",
                  "one of " + Join(known_names) + ", or a new entry with a model",
                  Nearest(name, known_names));
     }
@@ -198,8 +201,8 @@ void CheckInputs(const EstimatorSpec& filter, const EstimatorSpec& spec, const N
     const auto sensor = std::ranges::find(sensors, stream, &SensorBinding::stream);
     if (!motion.model->has_input() || sensor == sensors.end()) continue;
     key.Fail("stream '" + stream + "' is the control input of '" + motion.name +
-                 "' and the stream of sensor '" + sensor->name + "' of '" + filter.name +
-                 "', so rejected measurements would be missing as inputs",
+                 "' and also the stream of sensor '" + sensor->name + "' of '" + filter.name +
+                 "', so measurements that '" + filter.name + "' rejects would be missing as inputs",
              "a filter without a sensor on that stream");
   }
 }
@@ -223,10 +226,11 @@ int ReadUse(const Node& use, const EstimatorSpec& spec, const Node& estimators,
     for (const auto& [listed, entry] : estimators.Entries()) known_names.push_back(listed);
     if (std::ranges::find(known_names, name) != known_names.end()) {
       key.Fail("'" + name + "' is listed after '" + spec.name + "'",
-               "an estimator listed before it, which processes each frame first");
+               "an earlier estimator, which processes each frame before '" + spec.name + "'");
     }
     std::erase(known_names, spec.name);
-    key.Fail("no estimator '" + name + "'", "a name from `estimators`", Nearest(name, known_names));
+    key.Fail("estimator '" + name + "' does not exist", "a name from `estimators`",
+             Nearest(name, known_names));
   }
   CheckAccepts(*found, spec, key);
   const int first = static_cast<int>(found - earlier_estimators.begin());
@@ -264,9 +268,8 @@ std::unique_ptr<Estimator> Create(const EstimatorMaker& make, const EstimatorSpe
 /// Rejects an estimator that cannot roll back for out-of-sequence frames.
 void CheckCanRollBack(const EstimatorSpec& spec, const Node& entry) {
   if (spec.estimator->offline() || spec.estimator->Clone() != nullptr) return;
-  entry.At("type").Fail(
-      "'" + spec.type + "' cannot roll back for an out-of-sequence frame",
-      "another type under 'out_of_sequence.policy: rollback', or 'out_of_sequence.policy: buffer'");
+  entry.At("type").Fail("'" + spec.type + "' cannot roll back for an out-of-sequence frame",
+                        "another type of estimator, or 'out_of_sequence.policy: buffer'");
 }
 
 }  // namespace
@@ -318,7 +321,8 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
     RefuseSingleMatches(entry, spec.problem);
   }
   if (streams != nullptr) CheckStreams(merged.root(), spec.problem, *streams);
-  // This estimator must initialise each landmark at the same frame as the other estimator.
+  // This estimator must initialise each landmark at the same frame as the estimator whose accepted
+  // measurements it uses.
   const bool uses_accepted = use && use->is_map();
   if (uses_accepted && spec.problem.landmarks) {
     LandmarkOptions& landmarks = *spec.problem.landmarks;
@@ -334,13 +338,14 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
 int FindStream(const Node& sensor, const SensorModel& model,
                const std::vector<StreamInfo>& streams) {
   const int index = FindStreamOf(sensor, model.measurement().geometry.ambient,
-                                 "model '" + model.name() + "' measures", streams);
+                                 "the measurement of model '" + model.name() + "'", streams);
   const int known_size = streams[static_cast<std::size_t>(index)].known;
   if (known_size != model.known_size()) {
     sensor.At("stream").Fail(
         "stream '" + streams[static_cast<std::size_t>(index)].name + "' has " +
-            std::to_string(known_size) + " known numbers per measurement",
-        std::to_string(model.known_size()) + ", as model '" + model.name() + "' requires" +
+            std::to_string(known_size) + (known_size == 1 ? " known number" : " known numbers") +
+            " per measurement",
+        std::to_string(model.known_size()) + " for model '" + model.name() + "'" +
             (model.known_size() > 0 ? ": " + Join(ColumnNames(model.known().name, model.known()))
                                     : std::string()));
   }
@@ -356,7 +361,7 @@ void CheckStreams(const Node& root, const Problem& problem,
     if (!motion.model->has_input()) continue;
     const Space& input = motion.model->input();
     FindStreamOf(root.At("state").At(motion.name).At("input"), input.geometry.ambient,
-                 "control input '" + input.name + "' of model '" + motion.model->name() + "'",
+                 "the control input '" + input.name + "' of model '" + motion.model->name() + "'",
                  streams);
   }
 }

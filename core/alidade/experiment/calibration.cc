@@ -18,12 +18,15 @@ void MarkAsRead(const Node& map) {
 Config WithCalibration(const Config& config, const Source& source) {
   const Node root = config.root();
   if (const auto node = root.Find("calibration")) {
-    node->Fail("a config cannot contain this key: the data provide the calibration", "'camera'");
+    node->Fail("a config cannot contain this key, because the data provide the calibration",
+               "the key 'camera'");
   }
   const auto use = root.At("source").Find("calibration");
   if (use && use->Choice({"use", "ignore"}) == 1) return config;
   const std::optional<Config> calibration = source.Calibration();
-  if (use && !calibration) use->Fail("this source does not provide a calibration", "no such key");
+  if (use && !calibration) {
+    use->Fail("this source does not provide a calibration; remove this key");
+  }
   if (!calibration) return config;
   Config calibrated = config.Merged(calibration->root());
   MarkAsRead(calibrated.root().At("calibration"));

@@ -6,10 +6,10 @@
 
 namespace alidade::internal {
 
-/// Returns a copy of the config with the calibration of the data added under the root key
+/// Returns a copy of the config that also contains the calibration of the data, under the root key
 /// `calibration`. Models read the calibration from this key (ParamReader). Returns `config`
 /// unchanged if the data have no calibration, or if `source.calibration` is `ignore`. Errors:
-/// kBadConfig, those of Source::Calibration.
+/// kBadConfig, and those of Source::Calibration.
 Config WithCalibration(const Config& config, const Source& source);
 
 }  // namespace alidade::internal

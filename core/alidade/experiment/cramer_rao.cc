@@ -13,7 +13,7 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns the problem of the optimal filter: it has no losses, evaluates all Jacobians at the
+/// Returns the problem of the optimal filter, which has no losses, evaluates all Jacobians at the
 /// state, and updates all roles.
 Problem IdealProblem(Problem problem) {
   for (SensorBinding& sensor : problem.sensors) {
@@ -34,18 +34,19 @@ bool HasFailedMeasurement(const UpdateReport& report) {
   });
 }
 
-/// Returns the reason why landmarks of `sensor` cannot start at truth, or "" if they can.
+/// Returns the reason why landmarks of `sensor` cannot start at truth, or "" if they can start
+/// there.
 std::string WhyNotAtTruth(const SensorBinding& sensor) {
   const auto representation = RepresentationOf(sensor.model->roles());
   const std::string name = '\'' + sensor.name + '\'';
   if (!representation) return name + " has a custom landmark representation";
   if (IsXyz(*representation) && sensor.model->inverse().prior_size > 0) {
-    return name + " initialises xyz landmarks with a prior, and the Jacobians depend on its mean";
+    return name + " initialises xyz landmarks with a prior, whose mean changes the Jacobians";
   }
   return "";
 }
 
-/// Returns the reason why a problem with landmarks has no bound, or "" if it has one.
+/// Returns the reason why a problem with landmarks has no bound, or "" if it has a bound.
 std::string WhyNoMap(const Problem& problem) {
   for (std::size_t i = 0; i < problem.sensors.size(); ++i) {
     const SensorBinding& sensor = problem.sensors[i];
@@ -64,8 +65,8 @@ std::int64_t LandmarkOf(const Block& block) {
   return std::stoll(block.name.substr(block.owner.size() + 1));
 }
 
-/// Returns the values of a landmark at p in the given representation. The anchor is one metre from
-/// p, at lower z. Measurements of the landmark do not depend on the anchor.
+/// Returns the values of a landmark at p in the given representation. The anchor is p - (0, 0, 1)
+/// m. Measurements of the landmark do not depend on the anchor.
 std::vector<double> LandmarkValues(LandmarkRepresentation representation,
                                    const std::array<double, 3>& p) {
   return WithRepresentation(representation, [&](auto representation_type) {

@@ -16,24 +16,26 @@
 namespace alidade::internal {
 
 /// Cramer-Rao bound of a filter: no unbiased estimate from the same data has a smaller covariance.
-/// The bound is that of the true trajectory of the run (the parametric bound of [Bergman1999], ch.
-/// 4). It starts from P_0 of the prior. F, G, Q, H and R are evaluated at the true state x_k of
-/// each timestamp:
+/// The bound applies to the true trajectory of the run (the parametric bound of [Bergman1999], ch.
+/// 4). The recursion starts from P_0 of the prior. F, G, Q, H and R are evaluated at the true state
+/// x_k of each timestamp:
 ///
 ///   P- = F P F' + G Q G',   P = (P-^-1 + H' R^-1 H)^-1
 ///
 /// These are the equations of Ekf. The class therefore runs an Ekf without gate and loss, and sets
-/// the state of this filter to truth before and after each step. The measured values have only two
-/// effects: they determine which measurements are valid, and the covariance of blocks that start
-/// from a measurement.
+/// the state of this filter to truth before and after each step. The measured values determine only
+/// which measurements are valid, and the covariance of the blocks that are initialised from a
+/// measurement.
 ///
-/// Landmarks are also set to truth, in their own representation, with the true camera position. In
-/// a problem with landmarks, the prediction h at truth replaces each valid measurement. Updates
-/// then do not move the state, and landmarks are initialised with the Jacobians at truth. Of a
-/// prior of the inverse distance, only the sigma has an effect, not the mean.
+/// Landmarks are also set to truth. The true positions of a landmark and of the camera determine
+/// the values of its representation. In a problem with landmarks, the prediction h at truth
+/// replaces each valid measurement. Updates then do not move the state, and landmarks are
+/// initialised with the Jacobians at truth. If the inverse distance has a prior, only the sigma of
+/// the prior has an effect.
 class CramerRaoBound {
  public:
-  /// Function that returns the true position in m of the landmark with this id, if it is known.
+  /// Function that returns the true position of the landmark with this id, in m, or nullopt if the
+  /// position is unknown.
   using TrueLandmark = std::function<std::optional<std::array<double, 3>>(std::int64_t id)>;
 
   /// Returns the reason why a problem has no bound, as the text after `no Cramer-Rao bound: `.
@@ -45,8 +47,8 @@ class CramerRaoBound {
                  const std::vector<StreamInfo>& truths, TrueLandmark true_landmark = {});
 
   /// Processes the next frame of a run, in the order of time. Returns false if the bound does not
-  /// exist from this frame on: the truth of an estimated block or landmark is unknown, a step
-  /// failed, or a landmark could not start at truth. All later calls then return false too.
+  /// exist for this frame, because the truth of an estimated block or landmark is unknown, a step
+  /// failed, or a landmark could not start at truth. All later calls then also return false.
   bool Add(const SourceFrame& frame);
   /// Returns the true values with the bound P as covariance.
   const State& state() const { return engine_.f.state; }
@@ -61,7 +63,7 @@ class CramerRaoBound {
   FilterEngine engine_;
   TrueLandmark true_landmark_;
   std::vector<int> sensors_;  ///< index of the sensor of each stream, or -1
-  /// True values of each landmark block, by its name.
+  /// True values of each landmark block. The key is the name of the block.
   std::map<std::string, std::vector<double>> landmarks_;
   std::vector<int> truths_;  ///< index of the truth of each block, or -1
   bool is_lost_ = false;

@@ -25,7 +25,7 @@ Node FindDefectNode(const ProblemDefect& defect, const Node& root, const Problem
   if (defect.block >= 0) {
     const Block& block = problem.layout[defect.block];
     const auto entry = root.At("state").Find(block.owner);
-    // A sensor owns the block.
+    // If `state` does not contain the owner of the block, the owner is a sensor.
     const Node state = entry ? *entry : root.At("sensors").At(block.owner);
     if (defect.key == std::string_view("consider")) return FindConsiderItem(state, block);
     return state.At("initial").At(NameInEntry(block)).At(defect.key);
@@ -34,7 +34,7 @@ Node FindDefectNode(const ProblemDefect& defect, const Node& root, const Problem
   const SensorBinding& sensor = problem.sensors[static_cast<std::size_t>(defect.sensor)];
   const Node roles = root.At("sensors").At(sensor.name).At("roles");
   const auto role = roles.Find(sensor.model->roles()[static_cast<std::size_t>(defect.role)].name);
-  if (!role) return roles;  // a time offset added the role
+  if (!role) return roles;  // the role of a time offset is not in the config
   return role->At(defect.key);
 }
 

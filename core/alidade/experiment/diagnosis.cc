@@ -22,14 +22,15 @@ void AddUnitEvents(const Problem& problem, const Metrics& metrics, EstimatorResu
     const std::string unit = measured.unit.empty() ? "the model's units" : measured.unit;
     result.events.push_back(
         {kNoTimestamp, EventKind::kUnit,
-         "sensor '" + sensor.name + "': the median of |z - h| is more than " +
-             (is_angle ? "5 sigma, and |z - h| > pi / 4 or |z| > 2 pi" : "100 sigma") +
+         "sensor '" + sensor.name + "': most measurements z and their predictions h differ by " +
+             (is_angle ? "more than 5 sigma, with |z - h| > pi / 4 or |z| > 2 pi"
+                       : "more than 100 sigma") +
              "; is stream '" + sensor.stream + "' in " + (is_angle ? "rad" : unit) + '?'});
   }
 }
 
-/// Adds an event `nees_bounds` or `nis_bounds` for each mean of NEES or NIS outside its 95 %
-/// bounds.
+/// Adds an event `nees_bounds` or `nis_bounds` for each mean of NEES or NIS that is outside its 95
+/// % bounds.
 void AddConsistencyEvents(EstimatorResult& result) {
   const auto add_events = [&](EventKind event, const std::string& kind, const std::string& name,
                               const std::string& subject_kind) {
@@ -42,8 +43,8 @@ void AddConsistencyEvents(EstimatorResult& result) {
       if (low == result.metrics.end() || high == result.metrics.end()) continue;
       if (mean >= low->second && mean <= high->second) continue;
       result.events.push_back({kNoTimestamp, event,
-                               name + " mean " + RoundedText(mean, 3) + " of " + subject_kind +
-                                   subject + " is outside its 95 % bounds [" +
+                               "the mean " + name + " of " + subject_kind + subject + " is " +
+                                   RoundedText(mean, 3) + ", outside the 95 % bounds [" +
                                    RoundedText(low->second, 3) + ", " +
                                    RoundedText(high->second, 3) + "]: the filter is " +
                                    (mean > high->second ? "overconfident" : "underconfident")});
@@ -59,10 +60,10 @@ void AddTruthEvent(const Metrics& metrics, EstimatorResult& result) {
   if (names.empty()) return;
   result.events.push_back({kNoTimestamp, EventKind::kTruth,
                            "no frame contains the truth of " + Join(names) +
-                               "; do its times match those of the measurements?"});
+                               "; do the times of the truth match those of the measurements?"});
 }
 
-/// Adds an event `unused` for each sensor of which the estimator used no measurement in the whole
+/// Adds an event `unused` for each sensor whose measurements the estimator never used during the
 /// run.
 void AddUnusedEvents(const Problem& problem, EstimatorResult& result) {
   for (const SensorBinding& sensor : problem.sensors) {
@@ -82,10 +83,10 @@ void AddUnusedEvents(const Problem& problem, EstimatorResult& result) {
     if (used_count > 0) continue;
     const std::string finding =
         total > 0
-            ? " used none of " + std::to_string(total) +
+            ? ": the estimator used none of " + std::to_string(total) +
                   " measurements: " + Join(unused_counts, ", ")
             : ": stream '" + sensor.stream + "' had no measurement" +
-                  (result.accepted_by.empty() ? "" : " that " + result.accepted_by + " accepted");
+                  (result.accepted_by.empty() ? "" : " that '" + result.accepted_by + "' accepted");
     result.events.push_back(
         {kNoTimestamp, EventKind::kUnused, "sensor '" + sensor.name + "'" + finding});
   }

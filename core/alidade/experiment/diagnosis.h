@@ -5,9 +5,9 @@
 
 namespace alidade::internal {
 
-/// Completes the result of `run` except for the metrics. Adds the counts, the units, the map,
-/// whether the estimator failed, and an event for each finding, such as a sensor that was never
-/// used.
+/// Completes the result of `run` except for the metrics. Adds the counts, the units and the map,
+/// and sets the flags of divergence and failure. Also adds an event for each finding, such as a
+/// sensor that was never used.
 void Diagnose(const Experiment& experiment, EstimatorRun& run);
 
 }  // namespace alidade::internal

@@ -19,8 +19,8 @@ EstimatorGuide::EstimatorGuide(Experiment& experiment) : experiment_(experiment)
   if (experiment.guide != nullptr) experiment.source->SetGuide(this);
 }
 
-// If SetGuide throws, the source retains a dangling pointer to the guide. It does not use the guide
-// after the run.
+// If SetGuide throws, the source retains a dangling pointer to the guide. The source does not use
+// the guide after the run.
 EstimatorGuide::~EstimatorGuide() {
   try {
     if (experiment_.guide != nullptr) experiment_.source->SetGuide(nullptr);

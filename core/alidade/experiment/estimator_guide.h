@@ -12,10 +12,10 @@ namespace alidade::internal {
 /// Returns the first sensor on `stream` without known numbers, or null.
 const SensorBinding* GuidingSensor(const Problem& problem, std::string_view stream);
 
-/// Guide of the source of an experiment. It predicts measurements from the current state of the
-/// filter `experiment.guide`, with the GuidingSensor of that filter. The constructor sets it as the
-/// guide of the source, and the destructor removes it. It has no effect if `experiment.guide` is
-/// null.
+/// Guide of the source of an experiment. This object predicts measurements from the current state
+/// of the filter `experiment.guide`. The predicted sensor is the GuidingSensor() of this filter.
+/// The constructor sets this object as the guide of the source, and the destructor removes it. This
+/// object has no effect if `experiment.guide` is null.
 class EstimatorGuide : public Guide {
  public:
   explicit EstimatorGuide(Experiment& experiment);

@@ -12,20 +12,20 @@
 #include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/plugin_host.h"
 
-/// Estimators as C++ plugins.
+/// Estimators that C++ plugins provide.
 namespace alidade {
 
 inline constexpr const char* kEstimatorKind = "estimator";
 
-/// Function that creates an estimator with options that it already contains. `streams` are the
-/// streams of the source.
+/// Function that creates an estimator. The function already contains the options of the estimator.
+/// `streams` are the streams of the source.
 using EstimatorMaker = std::function<std::unique_ptr<Estimator>(
     const Problem& problem, const std::vector<StreamInfo>& streams)>;
 
 /// Arguments of the factory of an estimator.
 struct EstimatorArguments {
   Node entry;  ///< the config's entry of `estimators`
-  /// Reader of the same entry that also declares each parameter (numbers, flags, choices).
+  /// Reader of `entry`. The reader also declares each parameter (numbers, flags, choices).
   Params& params;
 };
 
@@ -35,12 +35,14 @@ struct EstimatorEntry {
   const char* doc;
   const char* citation;
   /// Reads the options and returns a function that creates the estimator for a problem. Both this
-  /// function and the returned one report errors by an Error with a place, as Node::Fail throws.
+  /// function and the returned function report an error by throwing an Error that contains a place
+  /// (see Node::Fail).
   EstimatorMaker (*create)(const EstimatorArguments& arguments);
   EstimatorKind kind = EstimatorKind::kFilter;
-  /// Capabilities of the estimator. A problem that needs more is rejected with an error that names
-  /// the missing capability, before the estimator is created. Null means that the estimator does
-  /// not support landmarks, and itself rejects everything else that it does not support.
+  /// Capabilities of the estimator. If a problem needs a capability that is missing, an error names
+  /// this capability, and the estimator is not created. If `capabilities` is null, the estimator
+  /// does not support landmarks, and must itself reject all other problems that it does not
+  /// support.
   const EstimatorCapabilities* capabilities = nullptr;
 };
 constexpr CppEntry EntryOf(const EstimatorEntry& estimator) {
@@ -51,7 +53,7 @@ constexpr CppEntry EntryOf(const EstimatorEntry& estimator) {
 const EstimatorEntry& EstimatorOf(const PluginEntry& entry);
 
 /// Reads the options of the estimator `name` from `node`, and returns a function that creates the
-/// estimator. Errors: kPlugin with the searched places, kBadConfig, those of the estimator.
+/// estimator. Errors: kPlugin with the searched places, kBadConfig, and those of the estimator.
 EstimatorMaker CreateEstimator(const PluginHost& host, const std::string& name, const Node& node);
 
 /// Returns the parameters of the estimator `entry`.

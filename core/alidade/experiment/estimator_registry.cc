@@ -24,10 +24,11 @@ EkfOptions ReadCommon(Params& p) {
           .value_or(options.gate);
   options.fuse =
       static_cast<Fuse>(p.Choice("fuse", {"joint", "per_sensor", "per_measurement"},
-                                 "how the measurements of one timestamp are grouped into updates",
+                                 "grouping of the measurements of one timestamp into updates",
                                  static_cast<int>(options.fuse)));
   options.max_dt_s =
-      p.NumberOrNone("max_dt_s", "s", "longer gaps are divided into equal steps", kPositive)
+      p.NumberOrNone("max_dt_s", "s", "longest step; longer gaps are divided into equal steps",
+                     kPositive)
           .value_or(options.max_dt_s);
   return options;
 }
@@ -40,8 +41,9 @@ EkfOptions ReadWithRecovery(Params& p) {
                "action after `rejection_recovery.after` rejections",
                static_cast<int>(options.rejection_recovery)));
   options.rejection_recovery_after =
-      p.Integer("rejection_recovery.after", "consecutive rejections of one sensor", 1, 1'000'000,
-                options.rejection_recovery_after);
+      p.Integer("rejection_recovery.after",
+                "number of consecutive rejections of one sensor that causes the action", 1,
+                1'000'000, options.rejection_recovery_after);
   options.max_covariance_repairs =
       p.Integer("max_covariance_repairs",
                 "maximum number of covariance repairs; the next one ends the estimator", 0,
@@ -75,10 +77,10 @@ UkfOptions ReadUkf(Params& p) {
   options.alpha = p.Number("alpha", "", "spread of the sigma points",
                            {UkfOptions::kMinAlpha, 1.0, false, false}, options.alpha);
   options.beta = p.NonNegative(
-      "beta", "", "weight added to the centre point in covariances; 2 is optimal for a Gaussian",
+      "beta", "", "extra weight of the centre point in covariances; 2 is optimal for a Gaussian",
       options.beta);
   options.kappa = p.NonNegative(
-      "kappa", "", "added to the dimension in the formula for the spread of the points",
+      "kappa", "", "addend to the dimension in the formula for the spread of the sigma points",
       options.kappa);
   options.filter = ReadCommon(p);
   return options;
@@ -88,7 +90,7 @@ Description DescribeCommon(const EkfOptions& options) { return {options, {}}; }
 Description DescribeEkf(const EkfOptions& options) {
   const bool latest = options.jacobian == JacobianPolicy::kLatest;
   return {options,
-          {{"jacobian", latest ? "latest: H at the estimate"
+          {{"jacobian", latest ? "latest: H at the latest estimate"
                                : "first_estimate: H at the first estimate of stationary blocks"}}};
 }
 Description DescribeIekf(const IekfOptions& options) {
@@ -102,8 +104,8 @@ Description DescribeUkf(const UkfOptions& options) {
                                       ", " + NumberText(options.kappa)}}};
 }
 
-/// Returns an estimator type. `read` reads its options, and `describe` describes them. A missing
-/// key has its default value.
+/// Returns an estimator type. `read` reads the options of the type, and `describe` describes these
+/// options. A missing key has its default value.
 template <class Filter, class Options>
 EstimatorType MakeType(const char* name, const char* doc, Options (*read)(Params&),
                        Description (*describe)(const Options&),
@@ -139,11 +141,11 @@ const std::vector<EstimatorType>& EstimatorTypes() {
   static const std::vector<EstimatorType> types = {
       MakeType<Ekf>("ekf", "Extended Kalman filter.", ReadEkf, DescribeEkf),
       MakeType<Iekf>("iekf", "Iterated extended Kalman filter.", ReadIekf, DescribeIekf),
-      MakeType<RtsSmoother>("rts", "Fixed-interval smoother after an extended Kalman filter.",
+      MakeType<RtsSmoother>("rts", "Fixed-interval smoother based on an extended Kalman filter.",
                             ReadCommon, DescribeCommon, EstimatorKind::kSmoother),
       MakeType<SquareRootEkf>("square_root_ekf",
-                              "Extended Kalman filter that carries a square root of P.", ReadCommon,
-                              DescribeCommon),
+                              "Extended Kalman filter that propagates a square root of P.",
+                              ReadCommon, DescribeCommon),
       MakeType<Ukf>("ukf", "Unscented Kalman filter.", ReadUkf, DescribeUkf),
   };
   return types;

@@ -63,7 +63,7 @@ std::string EstimatorRun::HandleFailures(const UpdateReport& report) {
     if (has_failed == 0) {
       AddEvents({{spec.estimator->timestamp(), EventKind::kSensorDisabled,
                   "sensor '" + sensor.name + "' has failed; its stream '" + sensor.stream +
-                      "' is ignored from now on, unless another sensor reads it"}});
+                      "' is ignored from now on, unless another sensor reads this stream"}});
     }
     has_failed = 1;
   }
@@ -121,7 +121,7 @@ EstimatorResult InitialResult(const EstimatorSpec& spec, const Experiment& exper
   result.unobservable = UnobservableDirections(spec.problem);
   if (!IsObservabilityComputed(spec.problem)) {
     result.events.push_back({kNoTimestamp, EventKind::kObservability,
-                             "not analysed: the state has more than " +
+                             "observability is not analysed: the state has more than " +
                                  std::to_string(kMaxObservabilityElements) + " elements"});
   }
   for (const auto& direction : result.unobservable) {

@@ -22,12 +22,11 @@ using internal::NamesOf;
 constexpr int kSchema = 1;
 
 void CheckSchema(const Node& root) {
-  const Node version = root.At("alidade", "every config: the version of its schema");
+  const Node version = root.At("alidade", "every config, because it is the version of the schema");
   const std::int64_t config_version = version.Integer(1, 1'000'000);
   if (config_version > kSchema) {
-    version.Fail("schema version " + std::to_string(config_version),
-                 std::to_string(kSchema) +
-                     ", the newest version that this program reads, or a newer alidade");
+    version.Fail("schema version " + std::to_string(config_version) + " is newer than this program",
+                 "at most " + std::to_string(kSchema) + ", or a newer version of alidade");
   }
 }
 
@@ -41,12 +40,12 @@ std::vector<Segment> ReadSegments(const Node& root, const Problem& problem,
       internal::ExpectName(name, entry, "a segment");
       const auto with_node = entry.Find("with"), without_node = entry.Find("without");
       if (with_node.has_value() == without_node.has_value()) {
-        entry.Fail("needs exactly one condition", "one of with: SENSOR, without: SENSOR");
+        entry.Fail("a segment needs exactly one condition", "`with: SENSOR` or `without: SENSOR`");
       }
       const Node& sensor = with_node ? *with_node : *without_node;
       const int index = problem.FindSensor(sensor.Text());
       if (index < 0) {
-        sensor.Fail("no sensor '" + sensor.Text() + "'", "a name from `sensors`",
+        sensor.Fail("sensor '" + sensor.Text() + "' does not exist", "a name from `sensors`",
                     Nearest(sensor.Text(), NamesOf(problem.sensors)));
       }
       const SensorBinding& binding = problem.sensors[static_cast<std::size_t>(index)];
@@ -62,7 +61,7 @@ std::vector<Segment> ReadSegments(const Node& root, const Problem& problem,
 }
 
 /// Rejects a truth in the config that does not match any block of `full_problem` or of an
-/// estimator. `full_problem` has all sensors.
+/// estimator. `full_problem` contains all sensors.
 void CheckTruths(const Node& source, const Experiment& experiment, const Problem& full_problem) {
   const auto listed = source.Find("truth");
   if (!listed || !listed->is_map()) return;
@@ -94,13 +93,13 @@ OutOfSequencePolicy ReadOutOfSequence(const Node& root) {
   policy.policy = static_cast<OutOfSequence>(policy_node.Choice({"reject", "buffer", "rollback"}));
   const auto window = entry->Find("window_s");
   if (window && policy.policy == OutOfSequence::kReject) {
-    window->Fail("has no effect: 'policy: reject' does not buffer frames",
-                 "'policy: buffer' or 'rollback'");
+    window->Fail("this key has no effect, because 'policy: reject' does not buffer frames",
+                 "'policy: buffer' or 'policy: rollback'");
   }
   if (window) policy.window = TimestampFromSeconds(window->Number(0.0, 1e9));
   if (!window && policy.policy == OutOfSequence::kRollback) {
-    policy_node.Fail("'rollback' without 'window_s'",
-                     "'window_s', the largest lag of an out-of-sequence frame");
+    policy_node.Fail("'policy: rollback' needs the key 'window_s'",
+                     "'window_s', the largest lag of an out-of-sequence frame in seconds");
   }
   entry->RejectUnread();
   return policy;
@@ -127,18 +126,19 @@ int ReadReference(const Node& root, const std::vector<EstimatorSpec>& estimators
     std::vector<std::string> names = NamesOf(estimators);
     const std::string expected = "truth, or an estimator: " + internal::Join(names);
     names.emplace_back("truth");
-    reference->Fail("no estimator '" + name + "'", expected, Nearest(name, names));
+    reference->Fail("estimator '" + name + "' does not exist", expected, Nearest(name, names));
   }
   return static_cast<int>(found - estimators.begin());
 }
 
-/// Returns the accepted values of `guide`: the recursive filters of the config.
+/// Returns a text that describes the accepted values of `guide`: the recursive filters of the
+/// config.
 std::string GuideChoices(const std::vector<EstimatorSpec>& estimators) {
   std::vector<std::string> names;
   for (const EstimatorSpec& spec : estimators) {
     if (spec.estimator->AsFilter() != nullptr) names.push_back(spec.name);
   }
-  return names.empty() ? "none, as `estimators` has no recursive filter, such as one of type ekf"
+  return names.empty() ? "a recursive filter; add one to `estimators`, for example of type ekf"
                        : "a recursive filter of `estimators`: " + internal::Join(names);
 }
 
@@ -148,14 +148,15 @@ const Filter* ReadGuide(const Node& source, const Experiment& experiment) {
   if (name.empty()) return nullptr;
   const Node guide = source.At("guide");
   if (experiment.out_of_sequence.policy != OutOfSequence::kReject) {
-    guide.Fail("a guiding filter must process each frame before the source measures the next",
+    guide.Fail("a guiding filter must process each frame before the source measures the next one",
                "out_of_sequence: {policy: reject}");
   }
   const std::vector<EstimatorSpec>& estimators = experiment.estimators;
   const auto found = std::ranges::find(estimators, name, &EstimatorSpec::name);
   if (found == estimators.end()) {
     const std::vector<std::string> names = NamesOf(estimators);
-    guide.Fail("no estimator '" + name + "'", GuideChoices(estimators), Nearest(name, names));
+    guide.Fail("estimator '" + name + "' does not exist", GuideChoices(estimators),
+               Nearest(name, names));
   }
   const auto* const filter = found->estimator->AsFilter();
   if (filter == nullptr) {
@@ -168,7 +169,7 @@ const Filter* ReadGuide(const Node& source, const Experiment& experiment) {
   });
   if (!can_guide) {
     guide.Fail("estimator '" + name + "' has no sensor that can guide the source",
-               "a sensor without known numbers, on a stream of the source");
+               "a sensor that has no known numbers and uses a stream of the source");
   }
   return filter;
 }
@@ -184,22 +185,23 @@ void DeclareCommon(const Node& root) {
   if (const auto camera = root.Find("camera")) camera->Declare("baseline_m");
 }
 
-/// Reads `evaluate.truth_sigma`: the standard deviation of the elements of each truth of the
-/// source. Returns an empty list if the key is missing. Errors: kBadConfig for an unknown truth, a
-/// number below 0, or a `reference` that is not truth.
+/// Reads `evaluate.truth_sigma`, which contains the standard deviation of the elements of each
+/// truth of the source. Returns an empty list if the key is missing. Errors: kBadConfig for an
+/// unknown truth, a number below 0, or a `reference` that is not truth.
 std::vector<double> ReadTruthSigmas(const Node& root, const std::vector<StreamInfo>& truths,
                                     bool is_truth_reference) {
   const auto evaluate = root.Find("evaluate");
   const auto map = evaluate ? evaluate->Find("truth_sigma") : std::nullopt;
   if (!map) return {};
   if (!is_truth_reference)
-    map->Fail("has no effect: the reference is an estimator", "'reference: truth'");
+    map->Fail("this key has no effect, because the reference is an estimator",
+              "'reference: truth'");
   std::vector<double> sigmas(truths.size(), 0.0);
   for (const auto& [name, entry] : map->Entries()) {
     const auto truth = std::ranges::find(truths, name, &StreamInfo::name);
     if (truth == truths.end()) {
       const std::vector<std::string> names = NamesOf(truths);
-      entry.Fail("no truth '" + name + "'",
+      entry.Fail("the source has no truth '" + name + "'",
                  "a truth of the source" + (names.empty() ? "" : ": " + internal::Join(names)),
                  Nearest(name, names));
     }
@@ -228,7 +230,7 @@ std::vector<std::filesystem::path> PluginPaths(const Config& config) {
   if (const auto list = config.root().Find("plugins")) {
     for (const Node& item : list->Items()) {
       const std::filesystem::path path = item.Text();
-      if (path.empty()) item.Fail("empty path", "a plugin file, or a folder of plugins");
+      if (path.empty()) item.Fail("the path is empty", "a plugin file, or a folder of plugins");
       paths.push_back(path.is_absolute() ? path : config.folder() / path);
     }
   }
@@ -236,7 +238,7 @@ std::vector<std::filesystem::path> PluginPaths(const Config& config) {
 }
 
 std::set<std::string> KeysAndScalarsOf(const Config& config) {
-  // A copy, so reading it does not mark keys of the original as read.
+  // Reading the copy does not mark keys of the original as read.
   const Config copy = config.Copy();
   std::set<std::string> words;
   AddKeysAndScalars(copy.root(), words);
@@ -250,7 +252,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   }
 
   Experiment experiment;
-  const Node source = config.root().At("source", "a run: the source of its measurements");
+  const Node source = config.root().At("source", "a run, because it provides the measurements");
   if (const auto seed = source.Find("seed")) {
     experiment.seed = static_cast<std::uint64_t>(seed->Integer(0, INT64_MAX));
   }
@@ -272,7 +274,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
     internal::AddEstimator(calibrated, host, name, experiment);
   }
   if (experiment.estimators.empty()) {
-    root.At("estimators").Fail("empty", "at least one estimator");
+    root.At("estimators").Fail("the map is empty", "at least one estimator");
   }
   experiment.reference = ReadReference(root, experiment.estimators);
   experiment.guide = ReadGuide(source, experiment);

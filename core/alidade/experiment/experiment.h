@@ -31,8 +31,8 @@ enum class OnPluginFailure {
   kAbort,    ///< the run ends
 };
 
-/// Estimator of a run, with its problem. The problem is read from the config after the estimator's
-/// overrides were merged into it.
+/// Estimator of a run, with its problem. The estimator's overrides are merged into the config
+/// before the problem is read from the config.
 struct EstimatorSpec {
   std::string name;
   std::string type;
@@ -41,22 +41,23 @@ struct EstimatorSpec {
   std::unique_ptr<Estimator> estimator;
   OnDivergence on_divergence = OnDivergence::kReport;
   OnPluginFailure on_plugin_failure = OnPluginFailure::kSkip;
-  std::string overrides;  ///< `overrides` of its entry as YAML, or ""
-  /// Index of the earlier online estimator that selects the measurements: this estimator uses only
-  /// those that the other accepted or used to initialise a state. -1: it uses all measurements.
+  std::string overrides;  ///< `overrides` in the entry of the estimator as YAML, or ""
+  /// Index of an earlier online estimator. This estimator uses only the measurements that the
+  /// earlier estimator accepted or used to initialise a state. -1: this estimator uses all
+  /// measurements.
   int accepted_by = -1;
 };
 
-/// Set of timestamps for which metrics are also computed: the timestamps with, or without, a valid
-/// measurement of one sensor.
+/// Subset of the timestamps for which metrics are computed separately. One sensor has a valid
+/// measurement at either all or none of these timestamps.
 struct Segment {
   std::string name;
   int stream = -1;
-  bool has_measurement = true;  ///< true: timestamps with a measurement; false: those without
+  bool has_measurement = true;  ///< true if the sensor has a measurement at all of them
   SharedSensor sensor;          ///< sensor that determines whether a measurement is valid
 };
 
-/// How to treat a frame that is older than a frame that arrived earlier.
+/// Treatment of an out-of-sequence frame, which is older than a frame that arrived earlier.
 enum class OutOfSequence {
   kReject,  ///< estimators receive the frame at once, and count its measurements as stale
   kBuffer,  ///< frames are buffered as long as an older frame may still arrive
@@ -64,14 +65,14 @@ enum class OutOfSequence {
   kRollback,
 };
 
-/// Policy for frames that do not arrive in the order of their timestamps. Frames of equal
+/// Policy for frames that do not arrive in the order of their timestamps. Frames with equal
 /// timestamps are merged, except under kReject.
 struct OutOfSequencePolicy {
   OutOfSequence policy = OutOfSequence::kReject;
-  /// Largest lag behind the newest frame. A frame with a larger lag is dropped, with the event
-  /// `out_of_sequence`. Empty: no limit.
+  /// Largest accepted lag behind the newest frame. A frame with a larger lag is dropped, and the
+  /// event `out_of_sequence` reports this. nullopt: no limit.
   std::optional<Timestamp> window;
-  std::vector<int> ranks;  ///< rank of each stream, which orders the measurements of merged frames
+  std::vector<int> ranks;  ///< rank of each stream, by which merged measurements are sorted
 };
 
 /// Experiment that was built from a config and checked, and is ready to run.
@@ -82,8 +83,8 @@ struct Experiment {
   std::uint64_t seed = 1;
   OutOfSequencePolicy out_of_sequence;
   int reference = -1;  ///< index of the estimator that is the reference of the metrics; -1: truth
-  const Filter* guide = nullptr;     ///< filter that guides the source; null if no filter does
-  std::vector<double> truth_sigmas;  ///< sigma of each truth; empty: the sigmas of the source
+  const Filter* guide = nullptr;     ///< filter that guides the source; null without a guide
+  std::vector<double> truth_sigmas;  ///< sigma of each truth; if empty, the source defines them
 };
 
 /// Returns the files and folders under `plugins:`, resolved against the folder of the config.
@@ -93,7 +94,8 @@ std::vector<std::filesystem::path> PluginPaths(const Config& config);
 /// names is sufficient for the config.
 std::set<std::string> KeysAndScalarsOf(const Config& config);
 
-/// Creates the experiment of a config. Errors: kBadConfig, kPlugin, kInputMissing, ...
+/// Creates the experiment that a config describes. Errors: kBadConfig, kPlugin, kInputMissing, and
+/// others.
 Experiment BuildExperiment(const Config& config, const PluginHost& host);
 
 }  // namespace alidade

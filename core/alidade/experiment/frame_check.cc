@@ -79,8 +79,9 @@ void FrameCheck::operator()(SourceFrame& frame) {
 void FrameCheck::Check(const SourceFrame& frame) const {
   for (const Measurement& m : frame.measurements) {
     if (m.stream < 0 || m.stream >= std::ssize(streams_)) {
-      Reject(frame, "a measurement of stream " + std::to_string(m.stream) + " of " +
-                        std::to_string(streams_.size()));
+      Reject(frame, "a measurement with stream index " + std::to_string(m.stream) +
+                        ", although the number of streams is " + std::to_string(streams_.size()) +
+                        ',');
     }
     const Channel& channel = streams_[static_cast<std::size_t>(m.stream)];
     CheckSize(frame, channel.info, m.values);
@@ -90,13 +91,15 @@ void FrameCheck::Check(const SourceFrame& frame) const {
     }
     const int tangent = channel.geometry.tangent;
     if (!m.covariance.empty() && std::ssize(m.covariance) != tangent * tangent) {
-      Reject(frame, "a covariance of " + std::to_string(m.covariance.size()) + " numbers of '" +
-                        channel.info.name + "', not " + std::to_string(tangent * tangent) + ',');
+      Reject(frame, "a covariance of '" + channel.info.name + "' with " +
+                        std::to_string(m.covariance.size()) + " numbers, not " +
+                        std::to_string(tangent * tangent) + ',');
     }
   }
   if (frame.truth.size() > truths_.size()) {
-    Reject(frame,
-           std::to_string(frame.truth.size()) + " truths of " + std::to_string(truths_.size()));
+    Reject(frame, std::to_string(frame.truth.size()) +
+                      " truths, although the number of truths is " +
+                      std::to_string(truths_.size()) + ',');
   }
   for (std::size_t t = 0; t < frame.truth.size(); ++t) {
     if (!frame.truth[t].empty()) CheckSize(frame, truths_[t].info, frame.truth[t]);
@@ -111,7 +114,7 @@ void FrameCheck::Normalise(Channel& channel, std::vector<double>& value) {
     if (!(defect <= kUnitTolerance)) {
       throw Error(ExitCode::kBadData, ErrorLine(source_.place(), channel.info.name,
                                                 "the length of a " + SpacedName(part) +
-                                                    " is off by " + RoundedText(defect, 4),
+                                                    " differs from 1 by " + RoundedText(defect, 4),
                                                 "a length within 1e-3 of 1"));
     }
     if (defect > kCountedDefect) ++normalised_[channel.info.name];

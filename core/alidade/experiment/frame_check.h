@@ -10,9 +10,9 @@
 
 namespace alidade::internal {
 
-/// Check and normalisation of every frame of a source before any other use. It normalises
-/// quaternions and directions of measurements, control inputs and truth. It selects the sign of
-/// quaternions by ChooseSign, so the output of a run does not depend on the signs that the source
+/// Frame check: checks and normalises each frame of a source before the frame is used. Normalises
+/// the quaternions and directions of measurements, control inputs and truth. ChooseSign selects the
+/// signs of the quaternions, so the output of a run does not depend on the signs that the source
 /// chose.
 class FrameCheck {
  public:
@@ -24,10 +24,10 @@ class FrameCheck {
 
   /// Checks and normalises a frame. Errors: ContractViolation if the frame contradicts
   /// Source::streams() or truths(), because later code relies on their indices and sizes; kBadData
-  /// if a length differs from 1 by more than 1e-3.
+  /// if the length of a quaternion or direction differs from 1 by more than 1e-3.
   void operator()(SourceFrame& frame);
-  /// Selects the sign of each true quaternion so that it is nearer to the previous true quaternion.
-  /// Frames must be passed in the order of time.
+  /// Replaces each true quaternion q by -q if -q is nearer to the previous true quaternion. Frames
+  /// must be passed in the order of time.
   void ChooseTruthSigns(SourceFrame& frame);
 
  private:
@@ -35,7 +35,7 @@ class FrameCheck {
   struct Channel {
     StreamInfo info;
     Geometry geometry;                  ///< geometry of the values; a vector if it is unknown
-    std::vector<double> previous = {};  ///< previous value, if this is a truth
+    std::vector<double> previous = {};  ///< previous value of a truth; empty for a stream
   };
 
   void Check(const SourceFrame& frame) const;

@@ -16,7 +16,8 @@ struct FrameInnovation {
   double rms = std::numeric_limits<double>::quiet_NaN();  ///< sqrt(mean r_i^2) over all elements
 };
 
-/// Summarises the innovations of a sensor in the frame of `report`. `sensor` is its index.
+/// Summarises the innovations of a sensor in the frame of `report`. `sensor` is the index of the
+/// sensor.
 inline FrameInnovation FrameInnovationOf(const UpdateReport& report, int sensor) {
   FrameInnovation frame;
   double sum = 0.0, count = 0.0;
@@ -30,8 +31,8 @@ inline FrameInnovation FrameInnovationOf(const UpdateReport& report, int sensor)
   return frame;
 }
 
-/// Returns whether the rms of a frame is a reprojection error: the sensor measures landmarks, and
-/// all elements have one unit.
+/// Returns whether the rms of a frame is a reprojection error. This is the case if the sensor
+/// measures landmarks, and all elements of a measurement have the same unit.
 inline bool HasReprojection(const SensorBinding& binding) {
   return binding.model->has_landmark() && !binding.model->measurement().unit.empty();
 }

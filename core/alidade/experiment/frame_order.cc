@@ -124,7 +124,8 @@ void FrameOrder::Receive() {
   }
 }
 
-/// Inserts the frame into buffer_, or merges it into a buffered frame. Returns the index.
+/// Inserts the frame into buffer_, or merges it into a buffered frame. Returns the index of the new
+/// or merged frame.
 std::size_t FrameOrder::Insert(BufferedFrame&& received) {
   const auto timestamp = [](const BufferedFrame& buffered) { return buffered.frame.timestamp; };
   const auto next = std::ranges::lower_bound(buffer_, received.frame.timestamp, {}, timestamp);
@@ -139,8 +140,8 @@ std::size_t FrameOrder::Insert(BufferedFrame&& received) {
   return index;
 }
 
-/// Throws if both frames contain a measurement of the same stream, or different values of the same
-/// truth.
+/// Throws if both frames contain a measurement of the same stream and landmark, or different values
+/// of the same truth.
 void FrameOrder::CheckMerge(const BufferedFrame& buffered, const SourceFrame& part) const {
   const Source& source = *experiment_.source;
   const SourceFrame& merged = buffered.frame;
@@ -156,19 +157,19 @@ void FrameOrder::CheckMerge(const BufferedFrame& buffered, const SourceFrame& pa
     const auto first = std::ranges::find_if(merged.measurements, is_same);
     if (first == merged.measurements.end()) continue;
     const auto index = static_cast<std::size_t>(first - merged.measurements.begin());
-    fail("two measurements of stream '" +
-             source.streams()[static_cast<std::size_t>(m.stream)].name + "'",
+    fail("stream '" + source.streams()[static_cast<std::size_t>(m.stream)].name +
+             "' has two measurements",
          "one measurement per timestamp" + FirstPlaceText(buffered.places[index]));
   }
   for (std::size_t t = 0; t < std::min(merged.truth.size(), part.truth.size()); ++t) {
     if (part.truth[t].empty() || merged.truth[t].empty() || part.truth[t] == merged.truth[t])
       continue;
-    fail("two values of truth '" + source.truths()[t].name + "'", "one value per timestamp");
+    fail("truth '" + source.truths()[t].name + "' has two values", "one value per timestamp");
   }
 }
 
-/// Merges the measurements of both frames in the order of the config. Adds the truths that the
-/// buffered frame lacks.
+/// Merges the measurements of both frames, and sorts them by the ranks of their streams. Adds the
+/// truths that the buffered frame lacks.
 void FrameOrder::Merge(BufferedFrame& buffered, BufferedFrame&& received) const {
   SourceFrame &merged = buffered.frame, &part = received.frame;
   const auto key = [this](const Measurement& measurement) {
@@ -195,8 +196,8 @@ void FrameOrder::Merge(BufferedFrame& buffered, BufferedFrame&& received) const 
   }
 }
 
-/// Rolls each estimator back to the frame before index `first`, and processes the buffered frames
-/// from `first` on again.
+/// Rolls each estimator back to its state before the frame at index `first`, and processes this
+/// frame and all later buffered frames again.
 void FrameOrder::Replay(std::size_t first) {
   for (std::size_t e = 0; e < experiment_.estimators.size(); ++e) {
     if (!snapshots_[e]) continue;

@@ -15,30 +15,31 @@
 
 namespace alidade::internal {
 
-/// Sequence of the frames of a source, in the order that the OutOfSequencePolicy of the experiment
-/// requires. Under kRollback it also runs the estimators. They process each frame on arrival; after
-/// an out-of-sequence frame they repeat the later frames. It guides the source if the config
-/// requests a guide.
+/// Frame order: returns the frames of a source in the order that the experiment's
+/// OutOfSequencePolicy requires. Under kRollback, this class also runs the estimators. The
+/// estimators process each frame on arrival. After an out-of-sequence frame, they process the later
+/// frames again. If the config requests a guide, this class also guides the source.
 class FrameOrder {
  public:
   using Check = std::function<void(SourceFrame&)>;
 
-  /// Calls `check` for each frame before any other use. `check` throws if the estimators must not
-  /// process the frame.
+  /// Calls `check` for each frame before the frame is used. `check` throws if the estimators must
+  /// not process the frame.
   FrameOrder(Experiment& experiment, Check check);
   /// Restores each estimator to its state after the last frame that Next() returned.
   ~FrameOrder();
   FrameOrder(const FrameOrder&) = delete;
   FrameOrder& operator=(const FrameOrder&) = delete;
 
-  /// Returns, in `frame`, the next frame that no later arrival can precede. The result is false at
-  /// the end. An error of the source, of `check` or of an estimator is thrown after all buffered
-  /// frames were returned. Errors: kBadData if one timestamp has two measurements of a stream, or
-  /// two values of a truth.
+  /// Writes the next frame to `frame`. Unless the policy is kReject, no frame that arrives later
+  /// can precede this frame. Returns false if there are no more frames. If the source, `check` or
+  /// an estimator throws an exception, returns all buffered frames first, and then throws this
+  /// exception. Error: kBadData if one timestamp has two measurements of a stream, or two values of
+  /// a truth.
   bool Next(SourceFrame& frame);
-  /// Under kRollback, returns the result of the estimator for the last frame of Next(), which it
-  /// processed on arrival. Returns null under other policies. The result is valid until the next
-  /// call of Next().
+  /// Under kRollback, returns the result of the estimator for the frame that Next() last returned.
+  /// The estimator processed this frame on arrival. Returns null under other policies, and for an
+  /// offline estimator. The result is valid until the next call of Next().
   const ProcessedFrame* processed(std::size_t estimator) const;
   const Arrivals& arrivals() const { return arrivals_; }
   /// Returns an event `out_of_sequence` for each frame that was dropped since the last call.
@@ -64,8 +65,8 @@ class FrameOrder {
   Check check_;
   EstimatorGuide guide_;
   std::deque<BufferedFrame> buffer_;  ///< buffered frames in the order of their timestamps
-  /// Under kRollback: snapshots of each estimator for the buffered frames. nullopt for an offline
-  /// estimator.
+  /// Snapshots of each estimator for the buffered frames; nullopt for an offline estimator. The
+  /// list is empty unless the policy is kRollback.
   std::vector<std::optional<Snapshots>> snapshots_;
   Timestamp newest_ = kNoTimestamp;
   bool is_at_end_ = false;

@@ -9,7 +9,7 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns whether the sensor can initialise a scalar block from a measurement alone.
+/// Returns whether a single measurement of the sensor can initialise a scalar block.
 bool IsInvertible(const Problem& problem, const SensorBinding& binding) {
   const int role = binding.model->inverse().role;
   const int roles = static_cast<int>(binding.roles.size());

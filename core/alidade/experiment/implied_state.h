@@ -11,14 +11,15 @@
 namespace alidade::internal {
 
 /// State that one measurement implies without a filter: the value x of one scalar block for which
-/// h(x) = z, such as f B / d for a disparity d. If the sensor can initialise the block from a
-/// measurement alone, x is that initial value. Otherwise the measurement and all roles must be
-/// scalars. Newton's method then computes x for the first role, starting from truth, with the other
-/// roles at truth.
+/// h(x) = z, such as f B / d for a disparity d. If a single measurement can initialise the block, x
+/// is this initial value. Otherwise the measurement and all roles must be scalars. Newton's method
+/// then computes x for the first role. The method starts from the true value of this role, and all
+/// other roles have their true values.
 class ImpliedState {
  public:
-  /// Returns nullopt if the sensor does not imply a scalar because it has a landmark, known
-  /// numbers, more than one element, or roles without truth.
+  /// Returns the implied state of a sensor. Returns nullopt if its measurements do not imply a
+  /// scalar, for example because the sensor has a landmark, known numbers, several measured
+  /// elements, or roles without truth.
   static std::optional<ImpliedState> Of(const Problem& problem, const SensorBinding& binding,
                                         const std::vector<StreamInfo>& truths);
 
@@ -37,11 +38,13 @@ class ImpliedState {
   std::vector<int> truths_;  ///< index of the truth of each role
 };
 
-/// Returns the index of the truth of each role; empty if a role is unbound or has no truth.
+/// Returns the index of the truth of each role. Returns an empty list if a role is unbound or has
+/// no truth.
 std::vector<int> TruthsOfRoles(const Problem& problem, const SensorBinding& binding,
                                const std::vector<StreamInfo>& truths);
 
-/// Returns the true values of roles; empty if one is unknown.
+/// Returns the true values of the roles whose truths have the indices `truths`. Returns an empty
+/// list if a true value is unknown.
 std::vector<const double*> RolesAtTruth(const Truth& truth, const std::vector<int>& truths);
 
 }  // namespace alidade::internal

@@ -21,7 +21,7 @@ struct Nees {
   int dof = 0;         ///< 0 if no block is estimated
 };
 
-/// Computes the joint NEES of the estimated blocks among `errors`. C = P + T is that of Metrics.
+/// Computes the joint NEES of the estimated blocks among `errors`. Metrics defines C = P + T.
 Nees JointNees(const State& state, std::span<const BlockError> errors);
 
 }  // namespace alidade::internal

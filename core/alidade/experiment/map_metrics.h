@@ -14,13 +14,15 @@ namespace alidade::internal {
 /// Computes metrics of the landmarks whose position is finite and whose true position is known:
 ///
 ///   map.rmse         sqrt(mean |p - p_true|^2), m
-///   map.sim3.rmse    the same for s R p + t, with the similarity that minimises it [Umeyama1991]
-///   map.sim3.scale   s; both need at least three landmarks, not all at one position
+///   map.sim3.rmse    minimum of sqrt(mean |s R p + t - p_true|^2) over s, R, t [Umeyama1991], m
+///   map.sim3.scale   s at this minimum
+///
+/// The metrics `map.sim3` need at least three landmarks that are not all at one position.
 std::map<std::string, double> MapMetrics(const std::vector<LandmarkEstimate>& landmarks);
 
-/// Adds the final landmarks and their metrics to `result`. Also adds the true positions that
-/// `source` knows, both for these landmarks and for those that were removed earlier. Has no effect
-/// if `spec` has no landmarks.
+/// Adds the final landmarks and their metrics to `result`. Also adds the known true positions of
+/// these landmarks, and of the landmarks that were removed earlier. Has no effect if `spec` has no
+/// landmarks.
 void AddMapMetrics(const EstimatorSpec& spec, const Source& source, EstimatorResult& result);
 
 }  // namespace alidade::internal

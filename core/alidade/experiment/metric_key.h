@@ -10,11 +10,11 @@ namespace alidade {
 ///
 ///   NAME[:SUBJECT][@SEGMENT]      `rmse:target.depth@blind`, `accepted:stereo`, `map.rmse`
 struct MetricKey {
-  std::string name;     ///< `rmse`, `nees.mean`, `accepted`
-  std::string subject;  ///< block, owner or sensor; "" for the run
-  std::string segment;  ///< name in `evaluate.segments`; "" for the whole run
+  std::string name;     ///< name of the metric or count, such as `rmse` or `accepted`
+  std::string subject;  ///< name of a block, an owner or a sensor; "" for the run
+  std::string segment;  ///< name of a segment in `evaluate.segments`; "" for the whole run
 
-  /// Returns the key with this text form.
+  /// Returns the key whose text form is `text`.
   static MetricKey Parse(std::string_view text) {
     MetricKey key;
     const std::size_t segment = text.find('@');

@@ -21,8 +21,8 @@ namespace alidade {
 namespace internal {
 namespace {
 
-/// Returns the sort key of a metric. Shown metrics come first, in the order of kMetrics, and the
-/// whole run comes before segments. The last criterion is the name.
+/// Returns the sort key of a metric. Shown metrics come first, in the order of kMetrics, and
+/// metrics of the whole run come before metrics of segments. The last criterion is the name.
 auto Rank(const std::string& text) {
   const MetricKey key = MetricKey::Parse(text);
   const MetricInfo* const metric = FindMetric(key.name);
@@ -60,7 +60,7 @@ ScaledUnit ScaleUnit(const std::string& unit, double largest) {
 using Values = std::vector<std::optional<double>>;
 
 /// Returns cells with at least four significant digits and all digits before the decimal point.
-/// Uses scientific notation for magnitudes up to 1e-5 and from 1e7.
+/// Uses scientific notation for magnitudes of at most 1e-5 or at least 1e7.
 std::vector<std::string> Format(const Values& values) {
   constexpr double kSmall = 1e-5, kLarge = 1e7;
   const auto decimals = [](double v) {
@@ -102,7 +102,7 @@ Values ValuesOf(const RunResult& result, const std::string& key) {
 }
 
 /// Returns the largest finite RMSE of all blocks with this unit. If there is no truth, uses the
-/// RMSD instead. The result determines the common prefix of the whole table.
+/// RMSD instead. The result determines the common unit prefix of the whole table.
 double LargestRmse(const RunResult& result, const std::string& unit) {
   double largest = 0.0;
   for (const std::string& text : Keys(result, &EstimatorResult::metrics)) {
@@ -224,7 +224,7 @@ int PriorityOf(const MetricKey& key) {
 /// Returns the keys of MainRows() without `diverged` and `inconsistent`. Each round chooses one
 /// subject of each metric.
 std::set<std::string> MainKeys(const RunResult& result, const std::vector<std::string>& subjects) {
-  // Index of the subject, key.
+  // Each pair consists of the index of a subject and a key.
   std::map<int, std::vector<std::pair<std::size_t, std::string>>> by_priority;
   const auto add = [&](const std::vector<std::string>& candidates, bool is_count) {
     for (const std::string& text : candidates) {
@@ -332,7 +332,7 @@ std::string ReferenceText(const RunResult& result) {
   if (!result.withheld.empty()) return result.withheld;
   if (result.reference == "truth") return "";
   return "errors are differences from estimator '" + result.reference +
-         "', which is not the truth: no coverage, no NEES";
+         "', not from truth; coverage and NEES are not computed";
 }
 
 }  // namespace internal

@@ -12,7 +12,7 @@ namespace alidade::internal {
 /// Returns the keys of all metrics of all estimators. The metrics that tables show come first, in
 /// the order of kMetrics.
 std::vector<std::string> OrderedMetrics(const RunResult& result);
-/// Returns the keys of all counts, accepted measurements first.
+/// Returns the keys of all counts. The counts of accepted measurements come first.
 std::vector<std::string> OrderedCounts(const RunResult& result);
 
 /// Returns the rows of the metrics that tables show, and of all counts.

@@ -9,13 +9,13 @@
 
 namespace alidade {
 
-/// Subject in the key of a metric.
+/// Kind of subject that the key of a metric names.
 enum class MetricSubject { kRun, kBlock, kOwner, kSensor };
 
 /// Unit of a metric.
 enum class MetricUnit {
   kNone,
-  kSubject,  ///< unit of the block; for a sensor, unit of the block that it implies
+  kSubject,  ///< unit of the block, or of the block that the sensor implies
   kMetre,
   kMillisecond,
   kMicrosecond,
@@ -26,7 +26,7 @@ enum class MetricUnit {
 /// Best value of a metric.
 enum class MetricGoal { kNone, kZero, kOne, k95Percent };
 
-/// How the samples of a run are reduced to the metric.
+/// Method that reduces the samples of a run to the value of a metric.
 enum class MetricReduction { kMean, kRootMean, kMax, kLast };
 
 /// Section of a comparison that shows a metric.
@@ -40,7 +40,7 @@ enum class MetricSection {
 struct BlockSample {
   double square;                ///< |e|^2, infinite if e is not finite
   double error;                 ///< first element of e
-  std::optional<double> sigma;  ///< set only for a scalar block with a variance
+  std::optional<double> sigma;  ///< sigma of e; set only for a scalar block with a variance
 };
 /// Joint error of the blocks of an owner at one timestamp.
 struct OwnerSample {
@@ -58,17 +58,19 @@ struct ImpliedSample {
   double square;
 };
 
-/// Metric: its meaning, how it is accumulated over a run, and which tables show it. A sampled
-/// metric has exactly one of the four sample functions. Separate code computes the other metrics.
+/// Description of a metric: its meaning, its accumulation over a run, and the tables that show it.
+/// A sampled metric has exactly one of the four sample functions. Separate code computes the other
+/// metrics.
 struct MetricInfo {
   const char* name;
-  const char* meaning;  ///< text of the documentation, in Markdown
+  const char* meaning;  ///< description in the documentation, in Markdown
   MetricSubject subject;
   MetricUnit unit = MetricUnit::kNone;
   MetricGoal goal = MetricGoal::kNone;
   bool needs_truth = true;
 
-  // Sample functions: each returns one value for a timestamp or a measurement, or nullopt.
+  // Sample functions: each function returns the value of the metric for one timestamp or
+  // measurement, or nullopt if there is no value.
   std::optional<double> (*block)(const BlockSample&) = nullptr;
   std::optional<double> (*owner)(const OwnerSample&) = nullptr;
   std::optional<double> (*sensor)(const SensorSample&) = nullptr;
@@ -76,15 +78,15 @@ struct MetricInfo {
   MetricReduction reduction = MetricReduction::kMean;
   bool has_segments = false;  ///< true if the metric is also computed for each segment
 
-  bool is_shown = false;             ///< true if the tables of `run` and `sweep` have a row for it
-  bool is_shown_by_segment = false;  ///< true if these tables also have a row for each segment
+  bool is_shown = false;             ///< true if the tables of `run` and `sweep` show the metric
+  bool is_shown_by_segment = false;  ///< true if these tables also show each segment
   int priority = 0;  ///< order among the ten main rows of `run`, from 1; 0: not a main row
 
   MetricSection section = MetricSection::kNone;
   const char* label = "";  ///< name of the metric in a comparison
-  bool is_main = false;    ///< true if the short form of a comparison also shows it
+  bool is_main = false;    ///< true if the short form of a comparison shows it
   bool has_ratio = false;  ///< true if a comparison shows its ratio to the reference
-  bool is_ratio = false;   ///< true if the metric is itself a ratio of means over the runs
+  bool is_ratio = false;   ///< true if the metric is a ratio of means over the runs
   bool is_cost = false;    ///< true if the metric is a cost, which does not depend on the estimate
 };
 
@@ -115,9 +117,9 @@ inline constexpr std::array kMetrics = {
                .is_ratio = true},
     MetricInfo{.name = "implied.rmse",
                .meaning =
-                   "RMSE of the block that single measurements of the sensor imply without "
-                   "a filter, as in `implied_states.csv`: the baseline that any filter must "
-                   "beat. Includes gated measurements; all other roles have their true values",
+                   "RMSE of the block values that single measurements of the sensor imply "
+                   "without a filter (`implied_states.csv`). The RMSE of a useful filter is "
+                   "smaller. Includes gated measurements; all other roles have their true values",
                .subject = MetricSubject::kSensor,
                .unit = MetricUnit::kSubject,
                .goal = MetricGoal::kZero,
@@ -128,8 +130,8 @@ inline constexpr std::array kMetrics = {
                .section = MetricSection::kAlong,
                .label = "rmse of single measurements,"},
     MetricInfo{.name = "trajectory.sim3.rmse",
-               .meaning = "with landmarks: RMSE of the position after alignment by the similarity "
-                          "that minimises this RMSE [Umeyama1991]",
+               .meaning = "for a problem with landmarks: RMSE of the position after alignment by "
+                          "the similarity that minimises this RMSE [Umeyama1991]",
                .subject = MetricSubject::kRun,
                .unit = MetricUnit::kMetre,
                .goal = MetricGoal::kZero,
@@ -138,8 +140,8 @@ inline constexpr std::array kMetrics = {
                .is_main = true,
                .has_ratio = true},
     MetricInfo{.name = "trajectory.sim3.scale",
-               .meaning = "scale of the similarity of `trajectory.sim3.rmse`: true = scale x "
-                          "estimate",
+               .meaning = "scale of the similarity of `trajectory.sim3.rmse`, which maps the "
+                          "estimate to truth",
                .subject = MetricSubject::kRun,
                .goal = MetricGoal::kOne,
                .section = MetricSection::kAlong,
@@ -173,14 +175,14 @@ inline constexpr std::array kMetrics = {
                .is_main = true},
     MetricInfo{.name = "lag_ms",
                .meaning =
-                   "delay after truth, see [Lag](metrics.md#lag); > 0 is late; scalar blocks "
-                   "only",
+                   "delay of the estimate relative to truth, see [Lag](metrics.md#lag); positive "
+                   "if the estimate is late; only for scalar blocks",
                .subject = MetricSubject::kBlock,
                .unit = MetricUnit::kMillisecond,
                .goal = MetricGoal::kZero,
                .is_shown = true},
     MetricInfo{.name = "coverage95",
-               .meaning = "share of timestamps with \\|e\\| <= 1.96 sigma; scalar blocks only",
+               .meaning = "share of timestamps with \\|e\\| <= 1.96 sigma; only for scalar blocks",
                .subject = MetricSubject::kBlock,
                .unit = MetricUnit::kShare,
                .goal = MetricGoal::k95Percent,
@@ -195,8 +197,8 @@ inline constexpr std::array kMetrics = {
                .priority = 5},
     MetricInfo{
         .name = "nees.mean",
-        .meaning = "mean of e' C^-1 e / dof, jointly over the owner's estimated blocks with "
-                   "truth",
+        .meaning = "mean of e' C^-1 e / dof; e contains the errors of all estimated blocks of "
+                   "the owner that have truth",
         .subject = MetricSubject::kOwner,
         .goal = MetricGoal::kOne,
         .owner = [](const OwnerSample& s) -> std::optional<double> { return s.nees / s.dof; },
@@ -214,7 +216,7 @@ inline constexpr std::array kMetrics = {
                .meaning = "upper 95 % bound of `nees.mean`",
                .subject = MetricSubject::kOwner},
     MetricInfo{.name = "nees.dof",
-               .meaning = "number of error elements in the NEES, mean over the timestamps",
+               .meaning = "mean number of error elements in the NEES over the timestamps",
                .subject = MetricSubject::kOwner,
                .owner = [](const OwnerSample& s) -> std::optional<double> { return s.dof; }},
     MetricInfo{.name = "nees.within95",
@@ -268,7 +270,7 @@ inline constexpr std::array kMetrics = {
                .goal = MetricGoal::kZero,
                .needs_truth = false,
                .section = MetricSection::kAlong,
-               .label = "  of its initial filter",
+               .label = "  of the initial filter",
                .is_main = true,
                .is_cost = true},
     MetricInfo{.name = "time_us",
@@ -308,7 +310,7 @@ inline constexpr std::array kMetrics = {
                .section = MetricSection::kFinal,
                .label = "difference in sigmas"},
     MetricInfo{.name = "map.rmse",
-               .meaning = "sqrt(mean \\|p - p_true\\|^2) of the landmarks in the state at the end "
+               .meaning = "sqrt(mean \\|p - p_true\\|^2) over the landmarks of the final state "
                           "whose true position the source provides",
                .subject = MetricSubject::kRun,
                .unit = MetricUnit::kMetre,
@@ -319,28 +321,29 @@ inline constexpr std::array kMetrics = {
                .label = "map",
                .is_main = true,
                .has_ratio = true},
-    MetricInfo{
-        .name = "map.sim3.rmse",
-        .meaning = "`map.rmse` after alignment by the similarity that minimises it [Umeyama1991]",
-        .subject = MetricSubject::kRun,
-        .unit = MetricUnit::kMetre,
-        .goal = MetricGoal::kZero,
-        .is_shown = true,
-        .priority = 7,
-        .section = MetricSection::kFinal,
-        .label = "Sim3-aligned map",
-        .is_main = true,
-        .has_ratio = true},
+    MetricInfo{.name = "map.sim3.rmse",
+               .meaning = "`map.rmse` after alignment by the similarity that minimises this RMSE "
+                          "[Umeyama1991]",
+               .subject = MetricSubject::kRun,
+               .unit = MetricUnit::kMetre,
+               .goal = MetricGoal::kZero,
+               .is_shown = true,
+               .priority = 7,
+               .section = MetricSection::kFinal,
+               .label = "Sim3-aligned map",
+               .is_main = true,
+               .has_ratio = true},
     MetricInfo{.name = "map.sim3.scale",
-               .meaning = "scale of the similarity of `map.sim3.rmse`: true = scale x estimate",
+               .meaning = "scale of the similarity of `map.sim3.rmse`, which maps the estimate to "
+                          "truth",
                .subject = MetricSubject::kRun,
                .goal = MetricGoal::kOne,
                .is_shown = true,
                .section = MetricSection::kFinal,
                .label = "map, scale"},
     MetricInfo{.name = "map.rmsd",
-               .meaning = "`compare`: root mean square difference of the landmarks from the "
-                          "reference estimator",
+               .meaning = "`compare`: root mean square difference between the landmarks of the "
+                          "estimator and of the reference estimator",
                .subject = MetricSubject::kRun,
                .unit = MetricUnit::kMetre,
                .goal = MetricGoal::kZero,
@@ -350,7 +353,8 @@ inline constexpr std::array kMetrics = {
                .is_main = true},
     MetricInfo{
         .name = "map.sim3.rmsd",
-        .meaning = "`compare`: `map.rmsd` after alignment by the similarity that minimises it",
+        .meaning = "`compare`: `map.rmsd` after alignment by the similarity that minimises this "
+                   "RMSD",
         .subject = MetricSubject::kRun,
         .unit = MetricUnit::kMetre,
         .goal = MetricGoal::kZero,
@@ -359,8 +363,8 @@ inline constexpr std::array kMetrics = {
         .label = "RMSD, Sim3-aligned map",
         .is_main = true},
     MetricInfo{.name = "reprojection",
-               .meaning = "with landmarks: rms of the accepted innovations of a frame, as in "
-                          "`NAME/reprojection.csv`; median over the last half of the frames",
+               .meaning = "for a sensor of landmarks: median of the rms of accepted innovations in "
+                          "`NAME/reprojection.csv` over the second half of the frames",
                .subject = MetricSubject::kSensor,
                .unit = MetricUnit::kNone,
                .goal = MetricGoal::kZero,
@@ -368,9 +372,9 @@ inline constexpr std::array kMetrics = {
                .is_shown = true,
                .priority = 8},
     MetricInfo{.name = "settling_frames",
-               .meaning = "number of the first frame (from 1) from which the centred rms over up "
-                          "to 9 frames stays within 20 % of `reprojection`; infinite if this "
-                          "rms is outside this band at the end",
+               .meaning = "number, counted from 1, of the frame from which the centred rms over at "
+                          "most 9 frames stays within 20 % of `reprojection`; infinite if the "
+                          "last centred rms is outside this band",
                .subject = MetricSubject::kSensor,
                .unit = MetricUnit::kFrames,
                .goal = MetricGoal::kZero,

@@ -32,9 +32,9 @@ constexpr int kInconsistentTimestamps = 20;
 constexpr double kFarSigmas = 100.0;
 constexpr double kFarAngleSigmas = 5.0;
 
-/// Returns true if the innovation of an angle, which never exceeds pi, indicates another unit. Such
-/// an innovation is far beyond its sigma, and either it exceeds pi / 4 or the measurement exceeds a
-/// full turn.
+/// Returns true if the innovation of an angle indicates that the measurement has another unit. The
+/// innovation of an angle never exceeds pi. Another unit is likely if the innovation is far beyond
+/// its sigma, and if the innovation exceeds pi / 4 or the measurement exceeds a full turn.
 bool IsFarAngle(const MeasurementReport& measurement) {
   if (!(measurement.nis > kFarAngleSigmas * kFarAngleSigmas)) return false;
   if (measurement.innovation.empty() || measurement.z.empty()) return false;
@@ -45,7 +45,7 @@ bool IsFarAngle(const MeasurementReport& measurement) {
 }  // namespace
 
 struct Metrics::Impl {
-  /// Sums of the samples of one metric of one subject.
+  /// Sums of the samples of one metric for one subject.
   struct Accumulator {
     double sum = 0.0, max = 0.0, last = 0.0;
     std::int64_t count = 0;
@@ -82,7 +82,7 @@ struct Metrics::Impl {
     template <class Sample>
     void Add(std::optional<double> (*MetricInfo::*function)(const Sample&), std::size_t index,
              const Sample& sample) {
-      static const std::vector<std::size_t> sampled = [&] {  // a sample type has one member
+      static const std::vector<std::size_t> sampled = [&] {  // depends only on Sample
         std::vector<std::size_t> metrics_of_type;
         for (std::size_t m = 0; m < kMetrics.size(); ++m) {
           if (kMetrics[m].*function != nullptr) metrics_of_type.push_back(m);
@@ -99,8 +99,8 @@ struct Metrics::Impl {
     }
   };
 
-  /// Estimate and truth of a scalar block over evenly spaced timestamps, for its lag. Retains only
-  /// the first kMaxSize values, to limit memory and computing time.
+  /// Estimate and truth of a scalar block over evenly spaced timestamps, from which its lag is
+  /// computed. Retains only the first kMaxSize values, to limit memory and computing time.
   struct LagSeries {
     static constexpr std::size_t kMaxSize = 100'000;
 
@@ -123,7 +123,7 @@ struct Metrics::Impl {
     double step_ms() const {
       return 1e-6 * static_cast<double>(last - first) / static_cast<double>(truth.size() - 1);
     }
-    /// Returns true if all time steps are within 5 % of their mean, as those of a camera are.
+    /// Returns true if all time steps are within 5 % of their mean.
     bool is_even() const {
       if (truth.size() < 2 || shortest_step <= 0) return false;
       return 1e-6 * static_cast<double>(longest_step) < 1.05 * step_ms() &&
@@ -138,8 +138,8 @@ struct Metrics::Impl {
     std::string name, unit;
     Geometry geometry;
     std::vector<std::string> elements;  ///< names of the tangent elements
-    /// For each element, the number of timestamps in a row with an error above 10 sigma. -1 means
-    /// that the event was already reported.
+    /// Number of timestamps in a row at which the error of an element exceeded 10 sigma, for each
+    /// element. -1 means that the event was already reported.
     std::vector<int> outside_counts;
     bool is_scalar;
     double truth_variance;  ///< variance of each element of the truth
@@ -154,7 +154,7 @@ struct Metrics::Impl {
   };
 
   /// Every n-th value of a series. The stride n grows so that fewer than kMaxSize values are
-  /// stored. This limits the cost of computing their autocorrelation.
+  /// stored. This limits the cost of computing the autocorrelation of the series.
   struct ThinnedSeries {
     static constexpr std::size_t kMaxSize = 10'000;
     std::vector<double> values;
@@ -170,7 +170,7 @@ struct Metrics::Impl {
     }
   };
 
-  /// State that single measurements of a sensor imply. The source provides its truth.
+  /// State that single measurements of a sensor imply. The source provides the truth of this state.
   struct ImpliedBlock {
     internal::ImpliedState state;
     std::size_t truth;  ///< index into the truths
@@ -187,7 +187,7 @@ struct Metrics::Impl {
   struct NisSamples {
     bool has_bounds = false;  ///< true if a filter without a robust loss provides the innovations
     int dof = 0;
-    std::int64_t frames = 0, last_frame = -1;  ///< frames with an accepted measurement
+    std::int64_t frames = 0, last_frame = -1;  ///< count and index of frames with accepted data
     double smallest_gated = kInfinity;         ///< smallest NIS of a gated measurement
   };
 
@@ -211,7 +211,7 @@ struct Metrics::Impl {
   std::vector<std::array<std::int64_t*, kOutcomes.size()>> outcome_counts;
   std::map<std::string, std::int64_t> counts;
   std::map<std::string, std::string> units;
-  std::map<int, double> quantiles;  ///< chi2(0.95, dof)
+  std::map<int, double> quantiles;  ///< chi2(0.95, dof), by dof
   BlockId position_block = -1;      ///< position from which landmarks are observed; -1: none
   internal::TrajectoryAlignment alignment;
   std::vector<Event> events;

@@ -33,7 +33,7 @@ void ReadPrune(const Node& node, LandmarkOptions& options) {
   const auto ratio = node.Find("min_match_ratio"), attempts = node.Find("min_attempts");
   if (ratio) options.min_match_ratio = ratio->Number(0.0, 1.0);
   if (attempts && !ratio)
-    attempts->Fail("has no effect without min_match_ratio", "both keys or neither");
+    attempts->Fail("this key has no effect without min_match_ratio", "both keys, or neither");
   if (attempts) options.min_attempts = static_cast<int>(attempts->Integer(1, kMaxCount));
   node.RejectUnread();
 }
@@ -61,7 +61,8 @@ std::vector<KnownLandmark> ReadKnown(const Node& list) {
     landmark.sigma = node.At("sigma", "a known landmark").Number(0.0, kUnbounded);
     node.RejectUnread();
     if (!ids.insert(landmark.id).second) {
-      id.Fail("landmark " + std::to_string(landmark.id) + " is listed twice", "each id once");
+      id.Fail("landmark " + std::to_string(landmark.id) + " is listed twice",
+              "a different id for each landmark");
     }
   }
   return known;
@@ -124,8 +125,8 @@ std::string RepresentationText(const SensorBinding& sensor) {
 void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBinding& first_sensor) {
   const auto is_landmark = [](const Space& role) { return role.landmark(); };
   if (!std::ranges::is_partitioned(sensor.model->roles(), std::not_fn(is_landmark))) {
-    model.Fail("model '" + sensor.model->name() + "' has roles after those of its landmark",
-               "a model whose landmark roles come last");
+    model.Fail("model '" + sensor.model->name() + "' has roles after the roles of its landmark",
+               "a model whose last roles belong to the landmark");
   }
   if (sensor.model->inverse().prior_size > 1) {
     model.Fail("model '" + sensor.model->name() + "' needs a prior of " +
@@ -137,21 +138,20 @@ void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBind
   };
   if (!std::ranges::equal(LandmarkRoles(sensor), LandmarkRoles(first_sensor), is_same)) {
     model.Fail("model '" + sensor.model->name() + "' represents landmarks as " +
-                   RepresentationText(sensor) + ", unlike sensor '" + first_sensor.name + '\'',
-               "the same representation, " + RepresentationText(first_sensor));
+                   RepresentationText(sensor) + ", but sensor '" + first_sensor.name +
+                   "' represents them as " + RepresentationText(first_sensor),
+               "the same representation for all sensors");
   }
 }
 
-/// Rejects `key` if the sensor has no role `position`, the position from which it observes
-/// landmarks.
+/// Rejects `key` if the sensor has no role `position`, from which a sensor observes landmarks.
 void CheckPosition(const Node& key, const SensorBinding& sensor) {
   if (std::ranges::find(sensor.model->roles(), "position", &Space::name) !=
       sensor.model->roles().end()) {
     return;
   }
   key.Fail("model '" + sensor.model->name() + "' of sensor '" + sensor.name +
-               "' has no role 'position', from which landmarks are observed",
-           "the key left out");
+           "' has no role 'position', from which landmarks are observed; remove this key");
 }
 
 /// Rejects options that the sensor does not support.
@@ -168,23 +168,24 @@ void CheckOptions(const Node& node, const LandmarkOptions& options, const Sensor
         !(options.prior->inverse_distance > 0.0)) {
       prior.At("inverse_distance")
           .Fail("a landmark at infinity cannot have the representation xyz",
-                "a value above 0, 1/m");
+                "an inverse distance above 0 (in 1/m)");
     }
     if (options.prior->adapt_after > 0) CheckPosition(prior.At("adapt_after"), sensor);
   }
   const bool has_xyz = representation == internal::XyzRepresentation() || sensor.xyz != nullptr;
   if (!options.known.empty() && !has_xyz) {
-    node.At("known").Fail(model + " does not support the representation xyz", "no known landmarks");
+    node.At("known").Fail(model + " does not support the representation xyz; remove this key");
   }
   if (!(options.max_linearity_index > 0.0)) return;
   if (representation == internal::XyzRepresentation()) {
     node.At("convert_to_xyz")
-        .Fail("landmarks already have the representation xyz",
-              "representation: inverse_depth, or the key left out");
+        .Fail(
+            "landmarks already have the representation xyz; remove this key, or use "
+            "representation: inverse_depth");
   }
   if (!has_xyz)
     node.At("convert_to_xyz")
-        .Fail(model + " does not support the representation xyz", "the key left out");
+        .Fail(model + " does not support the representation xyz; remove this key");
   CheckPosition(node.At("convert_to_xyz"), sensor);
 }
 
@@ -195,7 +196,8 @@ void internal::ReadLandmarkKeys(const std::string& name, const Node& entry,
                                 SensorOptions& options) {
   const Node role = entry.At("roles").At("landmark", "sensor '" + name + "'");
   if (role.is_map() || role.Text() != "landmarks") {
-    role.Fail("not `landmarks`", "`landmarks`: each measurement names its landmark");
+    role.Fail("this role is not bound to `landmarks`",
+              "`landmarks`, because each measurement names its landmark");
   }
   if (const auto node = entry.Find("outlier_rejection")) {
     options.outlier_rejection = ReadOnePointRansac(*node);
@@ -215,7 +217,7 @@ std::optional<LandmarkOptions> internal::ReadLandmarks(const Node& root,
   const auto first = std::ranges::find_if(sensors, observes_landmarks);
   if (first == sensors.end()) {
     if (const auto node = root.Find("landmarks")) {
-      node->Fail("no sensor measures landmarks", "a sensor with a landmark, or the key left out");
+      node->Fail("no sensor measures landmarks; add such a sensor, or remove this key");
     }
     return std::nullopt;
   }
@@ -233,7 +235,8 @@ std::optional<LandmarkOptions> internal::ReadLandmarks(const Node& root,
         (role >= 0 && sensor.model->roles()[static_cast<std::size_t>(role)].landmark());
   }
   if (!can_initialise) {
-    node.Fail("no sensor can initialise a landmark from its first measurement", "known landmarks");
+    node.Fail("no sensor can initialise a landmark from its first measurement",
+              "known landmarks under `known`");
   }
   node.RejectUnread();
   return options;

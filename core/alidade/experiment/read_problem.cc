@@ -46,7 +46,7 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
     mean = node.Numbers(geometry.ambient);
   }
   if (DistanceFrom(geometry, mean.data()) > kUnitTolerance) {
-    node.Fail("not of unit length", "a length within 1e-3 of 1");
+    node.Fail("the value does not have unit length", "a length within 1e-3 of 1");
   }
   if (double_cover) internal::ChooseSign({}, mean);
   return mean;
@@ -56,7 +56,7 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
 Eigen::MatrixXd ReadCovariance(const Node& node, int size) {
   const auto sigma = node.Find("sigma"), covariance = node.Find("covariance");
   if (sigma.has_value() == covariance.has_value()) {
-    node.Fail("needs exactly one uncertainty", "sigma or covariance");
+    node.Fail("a block needs exactly one uncertainty", "either sigma or covariance");
   }
   if (covariance) {
     const std::vector<double> values = internal::ReadCovariance(*covariance, size);
@@ -65,14 +65,16 @@ Eigen::MatrixXd ReadCovariance(const Node& node, int size) {
   std::vector<double> values = sigma->Numbers();
   if (values.size() == 1) values.assign(static_cast<std::size_t>(size), values[0]);
   if (values.size() != static_cast<std::size_t>(size)) {
-    sigma->Fail(std::to_string(values.size()) + " numbers", std::to_string(size) + ", or one");
+    sigma->Fail("the list has " + std::to_string(values.size()) + " numbers",
+                std::to_string(size) + ", or one number for all elements");
   }
   const Eigen::VectorXd sigmas = Eigen::Map<const Eigen::VectorXd>(values.data(), size);
-  if (sigmas.minCoeff() < 0.0) sigma->Fail("negative", ">= 0");
+  if (sigmas.minCoeff() < 0.0) sigma->Fail("a standard deviation is negative", "numbers >= 0");
   return sigmas.cwiseAbs2().asDiagonal();
 }
 
-/// Reads the names of blocks of the entry in a list such as `consider: [depth]`.
+/// Reads a list of block names, such as `consider: [depth]`. Rejects a name that `accepted` does
+/// not contain.
 std::vector<std::string> ReadNames(const Node& entry, const char* key,
                                    const std::vector<std::string>& accepted) {
   std::vector<std::string> names;
@@ -81,7 +83,8 @@ std::vector<std::string> ReadNames(const Node& entry, const char* key,
   for (const Node& item : list->Items()) {
     const std::string name = item.Text();
     if (std::find(accepted.begin(), accepted.end(), name) == accepted.end()) {
-      item.Fail("no block '" + name + "' in this entry", {}, Nearest(name, accepted));
+      item.Fail("this entry has no block '" + name + "'", internal::Join(accepted),
+                Nearest(name, accepted));
     }
     names.push_back(name);
   }
@@ -92,8 +95,8 @@ bool Contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// Returns the names of the blocks in the order of the model. Replaces those that the entry
-/// renames.
+/// Returns the names of the blocks in the order of the model. Replaces the names of the blocks that
+/// the entry renames.
 std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& model) {
   std::vector<std::string> names = NamesOf(model.blocks());
   const auto renamed = entry.Find("blocks");
@@ -134,20 +137,22 @@ InitialValue ReadInitial(const Node& initial, const Space& space, const std::str
   return value;
 }
 
-/// Reads `input: {stream: NAME, timeout_s: S}` of a model with a control input.
+/// Reads `input: {stream: NAME, timeout_s: S}`. Rejects this key if the model has no control input.
 InputBinding ReadInput(const Node& entry, const MotionModel& model) {
   constexpr double kMaxSeconds = 1e9;
   InputBinding binding;
   if (!model.has_input()) {
     if (const auto input = entry.Find("input")) {
-      input->Fail("model '" + model.name() + "' has no control input", "the key left out");
+      input->Fail("model '" + model.name() + "' has no control input; remove this key");
     }
     return binding;
   }
   const std::string needed_by =
       "the control input " + model.input().name + " of model " + model.name();
   const Node input = entry.At("input", needed_by);
-  if (!input.is_map()) input.Fail("not a map", "{stream: NAME}, or {stream: NAME, timeout_s: S}");
+  if (!input.is_map()) {
+    input.Fail("the value is not a map", "{stream: NAME}, or {stream: NAME, timeout_s: S}");
+  }
   binding.stream = input.At("stream", needed_by).Text();
   if (const auto timeout = input.Find("timeout_s")) {
     binding.timeout_s = timeout->Number(0.0, kMaxSeconds, true);
@@ -167,7 +172,7 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
     if (!Contains(considered, block)) continue;
     entry.At("constant")
         .Fail("block '" + block + "' is also in `consider`",
-              "the block in one of them: a constant is exact, a consider state is uncertain");
+              "the block in only one of `constant` (exact) and `consider` (uncertain)");
   }
   const Node initial = entry.At("initial", "the state entry '" + name + "'");
   std::vector<InitialValue> values;
@@ -197,31 +202,35 @@ std::vector<double> ReadSqrtDiagonal(const Node& node, int size) {
   std::vector<double> sigma = node.Numbers();
   if (sigma.size() == 1) sigma.assign(n, sigma[0]);
   if (sigma.size() != n) {
-    node.Fail(std::to_string(sigma.size()) + " numbers", std::to_string(size) + ", or one");
+    node.Fail("the list has " + std::to_string(sigma.size()) + " numbers",
+              std::to_string(size) + ", or one number for all elements");
   }
   std::vector<double> root(n * n, 0.0);
   for (std::size_t i = 0; i < n; ++i) {
-    if (sigma[i] < 0.0) node.Fail("negative", ">= 0");
+    if (sigma[i] < 0.0) node.Fail("a standard deviation is negative", "numbers >= 0");
     root[i * n + i] = sigma[i];
   }
   return root;
 }
 
 /// Reads `constant`, {random_walk: SIGMA} or {gauss_markov: {sigma, time_constant_s}}. The sigma of
-/// a random walk is the one after one second; that of a Gauss-Markov process is the stationary one.
+/// a random walk is its standard deviation after one second. The sigma of a Gauss-Markov process is
+/// its stationary standard deviation.
 void ReadDynamics(const Node& node, int size, OwnedRole& owned) {
   owned.dynamics = OwnedDynamics::kConstant;
   owned.sqrt_density.clear();
   constexpr const char* kKinds =
       "constant, {random_walk: SIGMA}, or {gauss_markov: {sigma: SIGMA, time_constant_s: S}}";
   if (!node.is_map()) {
-    if (node.Text() != "constant") node.Fail("not a kind of dynamics", kKinds);
+    if (node.Text() != "constant") {
+      node.Fail("'" + node.Text() + "' is not a kind of dynamics", kKinds);
+    }
     return;
   }
   const auto walk = node.Find("random_walk"), markov = node.Find("gauss_markov");
   if (walk.has_value() == markov.has_value()) {
     node.RejectUnread();
-    node.Fail("needs exactly one kind of dynamics", kKinds);
+    node.Fail("a state needs exactly one kind of dynamics", kKinds);
   }
   node.RejectUnread();
   if (walk) {
@@ -238,9 +247,9 @@ void ReadDynamics(const Node& node, int size, OwnedRole& owned) {
   markov->RejectUnread();
 }
 
-/// Reader of the keys of a sensor entry for the states that the sensor owns: `initial` and
-/// `dynamics` by role, `consider` and `constant` as lists, `time_offset_s`. The model provides the
-/// defaults.
+/// Reader of the states that a sensor owns. The keys of the sensor's entry describe these states:
+/// the maps `initial` and `dynamics`, which have one key per role, the lists `consider` and
+/// `constant`, and `time_offset_s`. The model provides the defaults.
 class OwnedStateReader {
   static constexpr const char* kTimeOffset = "time_offset";
 
@@ -268,8 +277,8 @@ class OwnedStateReader {
     if (!std::exchange(has_read_state_, true) &&
         std::ranges::any_of(problem.layout.blocks(), has_name)) {
       entry_.Fail("the sensor owns the state '" + name_ + '.' + role.name +
-                      "', but a state entry has its name",
-                  "another name for the sensor, or the role bound under `roles`");
+                      "', but a state entry has the same name as the sensor",
+                  "another name for the sensor, or a block for the role under `roles`");
     }
     const bool is_offset = role.name == kTimeOffset;
     const auto initial = is_offset  ? (offset_->is_map() ? offset_ : std::nullopt)
@@ -282,7 +291,7 @@ class OwnedStateReader {
       entry_.At("consider")
           .Fail(
               "'" + role.name + "' cannot also be constant, because a constant has no uncertainty",
-              "`initial` with a sigma, and `constant` without it");
+              "a sigma under `initial`, and no entry '" + role.name + "' in `constant`");
     }
     OwnedState state = OwnedState::Of(owned);
     state.initial.status = is_constant     ? BlockStatus::kConstant
@@ -299,7 +308,9 @@ class OwnedStateReader {
     const auto dynamics = dynamics_ ? dynamics_->Find(role.name) : std::nullopt;
     if (dynamics) ReadDynamics(*dynamics, role.geometry.tangent, state.process);
     if (is_constant && dynamics && state.process.dynamics != OwnedDynamics::kConstant) {
-      dynamics->Fail("'" + role.name + "' is constant", "an initial sigma, or the key left out");
+      dynamics->Fail("'" + role.name +
+                     "' is constant, so it cannot have dynamics; "
+                     "add an initial sigma, or remove this key");
     }
     return state;
   }
@@ -315,7 +326,7 @@ class OwnedStateReader {
     const BlockId id =
         internal::AddOwnedState(problem, name_, space, Read(space, defaults, problem));
     const std::string reason = internal::OffsetInTime(problem, id, sensor);
-    if (!reason.empty()) offset_->Fail(reason, "the key left out");
+    if (!reason.empty()) offset_->Fail(reason + "; remove this key");
   }
 
   void RejectUnread() const {
@@ -324,12 +335,13 @@ class OwnedStateReader {
   }
 
  private:
-  /// Rejects an offset over which a filter cannot predict.
+  /// Rejects an offset that is too long for the prediction of a filter.
   void CheckOffset(const InitialValue& offset) const {
     constexpr double kMaxSeconds = 60.0;
     const double sigma = offset.covariance.size() == 0 ? 0.0 : std::sqrt(offset.covariance(0, 0));
     if (std::abs(offset.mean[0]) <= kMaxSeconds && sigma <= kMaxSeconds) return;
-    offset_->Fail("longer than a motion model can predict", "at most 60 s, also for sigma");
+    offset_->Fail("a motion model cannot predict over such a long time offset",
+                  "at most 60 s for the offset and for its sigma");
   }
 
   std::string name_;
@@ -344,7 +356,7 @@ BlockId FindBlock(const Node& node, const Problem& problem) {
   const BlockId id = problem.layout.Find(name);
   if (id >= 0) return id;
   const std::vector<std::string> names = NamesOf(problem.layout.blocks());
-  node.Fail("no state block '" + name + "'", "a block of `state`, as in ENTRY.BLOCK",
+  node.Fail("block '" + name + "' does not exist", "a block of `state`, in the form ENTRY.BLOCK",
             Nearest(name, names));
 }
 
@@ -367,7 +379,7 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
   if (!(block.geometry() == role.geometry)) {
     node.Fail(
         "block '" + block.name + "' has geometry " + ToString(block.geometry()),
-        ToString(role.geometry) + ", as role '" + role.name + "' of model '" + model.name() + "'");
+        ToString(role.geometry) + " for role '" + role.name + "' of model '" + model.name() + "'");
   }
   return binding;
 }
@@ -387,7 +399,8 @@ RobustLoss ReadLoss(const Node& node) {
   }
   node.RejectUnread();
   if (count != 1)
-    node.Fail("needs exactly one loss with its scale", "one of " + internal::Join(loss_texts));
+    node.Fail("the map must contain exactly one loss, with its scale",
+              "one of " + internal::Join(loss_texts));
   return *loss;
 }
 
@@ -426,8 +439,8 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
   entry.RejectUnread();
 }
 
-/// Returns the problem with only the named sensors, in this order, and the state entries that they
-/// use.
+/// Returns the problem with only the named sensors, in this order, and the state entries that these
+/// sensors use.
 Problem SelectSensors(Problem problem, const std::vector<std::string>& names) {
   std::vector<SensorBinding> sensors;
   std::vector<std::string> used_entries;
@@ -484,7 +497,10 @@ Problem ReadProblem(const Node& root, const PluginHost& host,
   Problem problem;
   for (const auto& [name, entry] : root.At("state", "a run").Entries()) {
     internal::ExpectName(name, entry, "a state entry");
-    if (name == "landmarks") entry.Fail("'landmarks' is not a state entry", "another name");
+    if (name == "landmarks") {
+      entry.Fail("'landmarks' cannot name a state entry, because landmark blocks use this name",
+                 "another name");
+    }
     ReadStateEntry(name, entry, host, problem);
   }
   for (const auto& [name, entry] : root.At("sensors", "a run").Entries()) {

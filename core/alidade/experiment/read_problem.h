@@ -11,9 +11,9 @@
 namespace alidade {
 
 /// Reads `state`, `sensors`, `landmarks`, `camera` and `initial_time_s` of the root of a config.
-/// `sensor_names` selects sensors, in this order, with the state entries that they use. If
-/// `sensor_names` is empty, reads all sensors and entries. Errors: kBadConfig with the place and a
-/// remedy, kPlugin.
+/// `sensor_names` selects the sensors, in this order, and the state entries that these sensors use.
+/// If `sensor_names` is empty, reads all sensors and state entries. Errors: kBadConfig with the
+/// place and a remedy, and kPlugin.
 Problem ReadProblem(const Node& root, const PluginHost& host,
                     const std::vector<std::string>& sensor_names);
 

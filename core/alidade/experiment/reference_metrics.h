@@ -11,10 +11,10 @@ namespace alidade::internal {
 /// Returns the blocks of a problem in the form of the truths of a source.
 std::vector<StreamInfo> BlocksOf(const Problem& problem);
 
-/// Values of an estimate, with the index of its frame in the run.
+/// Values of an estimate, and the index of the frame of the estimate in the run.
 struct Estimate {
   std::size_t frame;
-  /// Value of each block of the problem; empty if the block has none.
+  /// Value of each block of the problem. A value is empty if the block has no value.
   std::vector<std::vector<double>> values;
 };
 
@@ -28,8 +28,8 @@ struct FrameWithSegments {
 };
 
 /// Adds to `metrics` the differences between `estimates` and `reference` at the same frames. The
-/// truths of `metrics` must be BlocksOf() the problem of the reference. `frames` are all frames of
-/// the run. A reference value that is not finite counts as unknown.
+/// truths of `metrics` must be the result of BlocksOf() for the problem of the reference. `frames`
+/// are all frames of the run. A reference value that is not finite counts as unknown.
 void AddDifferences(const std::vector<Estimate>& estimates, const std::vector<Estimate>& reference,
                     const std::vector<FrameWithSegments>& frames, Metrics& metrics);
 

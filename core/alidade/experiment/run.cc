@@ -214,7 +214,7 @@ void SmoothAll(std::vector<EstimatorRun>& runs, const std::vector<FrameWithSegme
         RecordStop(run, e.what(), result);
         continue;
       }
-      // Not the estimator failed but another part, such as a record.
+      // The estimator did not fail, so another part, such as a record, threw the error.
       if (!estimator.failed()) throw;
       events.push_back({estimator.timestamp(), EventKind::kFailed, e.what()});
     }
@@ -227,7 +227,7 @@ void SmoothAll(std::vector<EstimatorRun>& runs, const std::vector<FrameWithSegme
 }
 
 /// Returns the reason why the estimates of a reference cannot be used for a comparison, or "" if
-/// they can.
+/// they can be used.
 std::string WhyNoReference(const EstimatorRun& reference) {
   const Estimator& estimator = *reference.spec.estimator;
   const char* state = nullptr;
@@ -239,8 +239,8 @@ std::string WhyNoReference(const EstimatorRun& reference) {
     state = "has no estimates";
   }
   if (state == nullptr) return "";
-  return "no reference: estimator '" + reference.spec.name + "' " + state +
-         ", the comparison with it is withheld";
+  return "no reference is available: estimator '" + reference.spec.name + "' " + state +
+         ", so the comparison with this estimator is withheld";
 }
 
 /// Adds the differences from the reference to the metrics of the other estimators.

@@ -15,7 +15,7 @@ namespace alidade {
 
 /// Statistics of the arrival order of the frames of a run.
 struct Arrivals {
-  std::int64_t out_of_sequence = 0;  ///< frames that are older than an earlier frame
+  std::int64_t out_of_sequence = 0;  ///< frames that are older than a frame that arrived earlier
   std::int64_t merged = 0;    ///< frames that were merged into a frame with the same timestamp
   std::int64_t dropped = 0;   ///< out-of-sequence frames that were older than the window allows
   Timestamp longest_lag = 0;  ///< largest lag behind the newest frame, ns
@@ -29,30 +29,31 @@ const char* ToString(RunStatus status);
 struct EstimatorResult {
   std::string name, type;
   EstimatorKind kind = EstimatorKind::kFilter;
-  bool smoothed = false;    ///< whether its estimates also depend on later data
-  std::string accepted_by;  ///< estimator whose accepted measurements it used, or ""
-  std::string overrides;    ///< `overrides` of its config entry as YAML, or ""
+  bool smoothed = false;    ///< whether estimates also depend on later data
+  std::string accepted_by;  ///< estimator whose accepted measurements this one used, or ""
+  std::string overrides;    ///< `overrides` of the config entry as YAML, or ""
   std::vector<std::string> sensors;
   std::string position_block;             ///< position from which landmarks are observed, or ""
   std::map<std::string, double> metrics;  ///< values by key; docs/metrics.md lists the keys
   std::map<std::string, std::int64_t> counts;  ///< counts by key, such as `accepted:stereo`
-  /// Unit by block, such as {"target.depth", "m"}; not all blocks have one.
+  /// Unit of each block that has a unit, such as {"target.depth", "m"}.
   std::map<std::string, std::string> units;
   bool diverged = false;      ///< whether the estimator reported that it diverged
-  bool inconsistent = false;  ///< whether it has an event `inconsistent`
-  bool failed = false;        ///< whether it diverged, or could not continue
+  bool inconsistent = false;  ///< whether an event `inconsistent` occurred
+  bool failed = false;        ///< whether the estimator diverged, or could not continue
   std::vector<Event> events;
   std::vector<std::vector<std::string>> unobservable;
-  /// Final map, for `landmarks.csv`; empty if the estimator has no landmarks.
+  /// Final map, for `landmarks.csv`; nullopt if the estimator has no landmarks.
   std::optional<std::vector<LandmarkEstimate>> landmarks;
   /// Landmarks that were removed during the run, in the order of removal, with their last
   /// estimates.
   std::vector<LandmarkEstimate> removed_landmarks;
-  /// Wall-clock time of its frames and its smoothing, s. Zero under kRollback.
+  /// Wall-clock time that the estimator needed for all frames and for smoothing, s. Zero under
+  /// kRollback.
   double wall_s = 0.0;
-  /// Shares of `wall_s` by FramePart, which filters with landmarks report.
+  /// Parts of `wall_s` by FramePart, s. Only filters with landmarks report these parts.
   std::array<double, kFrameParts> parts_s{};
-  double record_s = 0.0;  ///< additional time for its metrics and records, s
+  double record_s = 0.0;  ///< additional time for metrics and records, s
 };
 
 /// Result of a run.
@@ -69,8 +70,8 @@ struct RunResult {
   std::vector<EstimatorResult> estimators;
 };
 
-/// Observer of a run, called on the thread of the run. If the observer throws an exception, the run
-/// ends with this exception as its reason.
+/// Observer of a run. All calls occur on the thread of the run. If the observer throws an
+/// exception, the run ends with this exception as its reason.
 class RunObserver {
  public:
   virtual ~RunObserver() = default;
@@ -91,20 +92,21 @@ class RunObserver {
 /// Options of a run.
 struct RunOptions {
   std::vector<RunObserver*> observers;  ///< observers, which are called in this order
-  /// Receives the frames processed and their total, or -1.
+  /// Called after each frame with the number of processed frames and the total number of frames,
+  /// which is -1 if it is unknown.
   std::function<void(std::int64_t, std::int64_t)> progress;
   std::function<bool()> stop;  ///< returns true to stop after the current frame
 };
 
 /// Runs all estimators on the source, frame by frame, so all process the same data. The run ends
 /// early after an error in the data, or after a divergence under `on_divergence: fail`. If an
-/// estimator cannot continue, the others do. A frame that contradicts streams() or truths() of the
-/// source ends the run. A quaternion or direction whose length differs from 1 by more than 1e-3
-/// also ends the run. The result reports all errors; the function does not throw.
+/// estimator cannot continue, the other estimators continue. A frame that contradicts streams() or
+/// truths() of the source ends the run. A quaternion or direction whose length differs from 1 by
+/// more than 1e-3 also ends the run. The result reports all errors; the function does not throw.
 RunResult Run(Experiment& experiment, const RunOptions& options);
 
-/// Returns a table of the main metrics for a terminal, with one column for each estimator. Names
-/// the reference below the table if it is not truth.
+/// Returns a table of the main metrics for a terminal, with one column for each estimator. If the
+/// reference is not truth, a line below the table names the reference.
 std::string ComparisonTable(const RunResult& result);
 
 }  // namespace alidade

@@ -13,8 +13,8 @@ namespace alidade::internal {
 void LogExperiment(const Experiment& experiment);
 
 /// Logs one message for each event: a divergence as a warning, all others as info. If `is_reason`
-/// is true, the divergence is logged as info too, because the run also reports it as the reason for
-/// its end.
+/// is true, a divergence is also logged as info, because the run reports this divergence as the
+/// reason why it ended.
 void LogEvents(const std::string& estimator, std::span<const Event> events, bool is_reason = false);
 
 /// Logs the wall-clock time of each estimator. The level is debug.

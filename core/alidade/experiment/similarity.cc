@@ -19,9 +19,10 @@ bool DeterminesScale(double scale, double variance, double target_variance) {
 }
 
 /// Computes the symmetric matrix N that satisfies q' N q = tr(R' C) for the unit quaternion q = (w,
-/// x, y, z) of any rotation R. The largest eigenvalue of N is the maximum of tr(R' C): the sum of
-/// the singular values of C, the last one with the sign of det C. The eigenvector is the quaternion
-/// of the R that attains this maximum [Horn1987].
+/// x, y, z) of any rotation R. The largest eigenvalue of N is the maximum of tr(R' C). This maximum
+/// is the sum of the singular values of C, in which the smallest one has the sign of det C. The
+/// eigenvector of the largest eigenvalue is the quaternion of the R that attains the maximum
+/// [Horn1987].
 Eigen::Matrix4d HornMatrix(const Eigen::Matrix3d& c) {
   Eigen::Matrix4d n;
   n(0, 0) = c(0, 0) + c(1, 1) + c(2, 2);

@@ -8,8 +8,8 @@
 
 #include "alidade/state/eigen_alignment.h"
 
-/// Alignment by a similarity: s R p + t that minimises sum |q - s R p - t|^2 over points p, the
-/// columns of `source`, and q, the columns of `target` [Umeyama1991].
+/// Alignment by the similarity s R p + t that minimises the sum of |q - s R p - t|^2. The points p
+/// are the columns of `source`, and the points q are the columns of `target` [Umeyama1991].
 namespace alidade {
 
 /// Similarity transform: x_in_reference = scale rotation x_in_estimate + translation.
@@ -37,7 +37,8 @@ struct SimilarityFit {
   double rmse = 0.0, scale = 1.0;
 };
 
-/// Aligns the columns of `source` to those of `target`. Returns nullopt if FindSimilarity does.
+/// Aligns the columns of `source` to those of `target`. Returns nullopt if FindSimilarity returns
+/// nullopt.
 std::optional<SimilarityFit> AlignBySimilarity(const Eigen::Matrix3Xd& source,
                                                const Eigen::Matrix3Xd& target);
 

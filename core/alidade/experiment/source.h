@@ -16,7 +16,7 @@
 namespace alidade {
 
 /// True values at one timestamp: one vector for each entry of Source::truths(), with the size of
-/// that entry. If a vector is empty or missing at the end, the value is unknown.
+/// that entry. A value is unknown if its vector is empty, or if the list ends before its index.
 using Truth = std::vector<std::vector<double>>;
 
 /// Frame of a source, with the truth that metrics compare with the estimates.
@@ -30,17 +30,18 @@ struct GreyImage {
   std::vector<std::uint8_t> pixels;
 };
 
-/// Image in which a source measured. For a stereo pair, the image is that of the left camera.
+/// Image from which a source obtained measurements. For a stereo pair, it is the image of the left
+/// camera.
 struct MeasuredImage {
   GreyImage grey;
   /// Corners (u, v) of the measured target, px. Empty if the source does not track a target, or has
-  /// lost it.
+  /// lost the target.
   std::vector<std::array<double, 2>> outline = {};
 };
 
 /// Expected measurement of size m, with its covariance.
 struct ExpectedMeasurement {
-  std::vector<double> z;  ///< h; empty if the measurement cannot be predicted
+  std::vector<double> z;  ///< prediction h; empty if h cannot be computed
   std::vector<double> s;  ///< S = H P H' + R, m x m
 };
 
@@ -60,20 +61,19 @@ class Source {
  public:
   virtual ~Source() = default;
   virtual const std::vector<StreamInfo>& streams() const = 0;
-  /// Describes the true values that the source provides. They have the names of their blocks.
+  /// Describes the true values that the source provides. Each truth has the name of its block.
   virtual const std::vector<StreamInfo>& truths() const = 0;
-  /// Reads the next frame. Returns false at the end. The streams of its measurements must be
-  /// indices into streams(), and its values must have the sizes of streams() and truths(). Any
+  /// Reads the next frame. Returns false at the end. The streams of the measurements must be
+  /// indices into streams(). All values must have the sizes that streams() and truths() state. Any
   /// other frame ends the run with an internal error. Errors: kBadData, kIo.
   virtual bool Next(SourceFrame& frame) = 0;
-  /// Returns the name of the filter that guides this source, which the key `guide` contains.
-  /// Returns "" if no filter does.
+  /// Returns the name of the filter that guides this source, as in the key `guide`. Returns "" if
+  /// no filter guides this source.
   virtual std::string guide_name() const { return {}; }
   /// Sets the requested guide for the following frames; null removes the guide. Without a guide, as
   /// in `alidade simulate`, the source must measure without predictions.
   virtual void SetGuide(const Guide* /*guide*/) {}
-  /// Returns the true position of a landmark in the world, m; nullopt if the source does not know
-  /// it.
+  /// Returns the true position of a landmark in the world, m; nullopt if the position is unknown.
   virtual std::optional<std::array<double, 3>> TrueLandmark(std::int64_t /*id*/) const {
     return std::nullopt;
   }
@@ -82,9 +82,10 @@ class Source {
   /// Draws the image that camera `view` sees at the last frame. Camera 0 is the left camera of a
   /// pair.
   virtual GreyImage Draw(int /*view*/) { return {}; }
-  /// Returns whether the source measures in images, which LastImage() then returns.
+  /// Returns whether the source obtains its measurements from images. If so, LastImage() returns
+  /// them.
   virtual bool measures_images() const { return false; }
-  /// Returns the image in which the last frame was measured.
+  /// Returns the image from which the last frame was measured.
   virtual MeasuredImage LastImage() const { return {}; }
   /// Returns the calibration of the camera that recorded the data, if the data contain one. The
   /// calibration is a config with one map `calibration`, which has the keys that models read:
@@ -103,13 +104,13 @@ class PluginHost;  // defined in alidade/plugin/plugin_host.h
 /// Arguments of the factory of a source.
 struct SourceArguments {
   Node entry;  ///< the config's `source` map
-  /// Reader of the same map that also declares each parameter (numbers, flags, choices).
+  /// Reader of `entry`. The reader also declares each parameter (numbers, flags, choices).
   Params& params;
   std::uint64_t seed;
   std::filesystem::path folder;  ///< folder to which relative paths refer
   /// True if timestamps may repeat or decrease; the run then orders the frames.
   bool any_order = false;
-  /// The whole config, and a host that has the plugins that the config names. A source that
+  /// `config` is the whole config, and `host` has the plugins that the config names. A source that
   /// simulates models needs both. Both are null if only the keys of the source are requested.
   const Config* config = nullptr;
   const PluginHost* host = nullptr;

@@ -7,7 +7,7 @@ namespace alidade {
 
 std::unique_ptr<Source> CreateSource(const PluginHost& host, const Config& config,
                                      std::uint64_t seed, bool any_order) {
-  const Node node = config.root().At("source", "a run: the source of its measurements");
+  const Node node = config.root().At("source", "a run, because it provides the measurements");
   const PluginEntry& entry = host.Find(kSourceKind, node.At("type", "a source").Text(), node);
   const auto& factory = *static_cast<const SourceEntry*>(entry.factory);
   std::unique_ptr<Source> source;

@@ -9,7 +9,7 @@
 #include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/plugin_host.h"
 
-/// Sources as C++ plugins.
+/// Sources that C++ plugins provide.
 namespace alidade {
 
 inline constexpr const char* kSourceKind = "source";
@@ -18,7 +18,7 @@ inline constexpr const char* kSourceKind = "source";
 struct SourceEntry {
   const char* name;
   const char* doc;
-  /// Keys that are not read through Params, one per line: `key  meaning`.
+  /// Keys that the source does not read through Params. Each line has the form `key  meaning`.
   const char* keys;
   std::unique_ptr<Source> (*create)(const SourceArguments& arguments);
 };
@@ -27,7 +27,7 @@ constexpr CppEntry EntryOf(const SourceEntry& source) {
 }
 
 /// Creates the source that the map `source` of a config describes. SourceArguments describes
-/// `any_order`. Errors: kPlugin with the searched places, kBadConfig, those of the source.
+/// `any_order`. Errors: kPlugin with the searched places, kBadConfig, and those of the source.
 std::unique_ptr<Source> CreateSource(const PluginHost& host, const Config& config,
                                      std::uint64_t seed, bool any_order = false);
 

@@ -31,7 +31,8 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Series minus its mean, with the sums of its first k values and of the squares of these values.
+/// Series from which its mean was subtracted. sums[k] is the sum of the first k values, and
+/// squares[k] is the sum of their squares.
 struct CentredSeries {
   Eigen::VectorXd values, sums, squares;
 
@@ -59,8 +60,8 @@ struct CentredSeries {
   }
 };
 
-/// Overlap of two series of n values, of which one is shifted by `shift`: the first index in each
-/// series, and the length.
+/// Overlap of two series of n values, one of which is shifted by `shift`. Contains the first
+/// overlapping index of each series, and the number of overlapping values.
 struct Overlap {
   Eigen::Index signal, reference, count;
 
@@ -100,9 +101,10 @@ bool IsRamp(const CentredSeries& series, Eigen::Index reach) {
   return true;
 }
 
-/// Fits a parabola through the largest score and its two neighbours. Returns the position of its
-/// maximum, relative to the middle of the scores. Returns NaN if the largest score is at the edge,
-/// or if it exceeds its neighbours only by rounding errors.
+/// Fits a parabola through the largest score and its two neighbours. Returns the position of the
+/// maximum of the parabola, relative to the middle of the scores. Returns NaN if a score is not
+/// finite, if the first or last score is the largest, or if the largest score exceeds its
+/// neighbours only by rounding errors.
 double Peak(const Eigen::VectorXd& scores) {
   constexpr double kRounding = 1e-12;
   const Eigen::Index middle = scores.size() / 2;
@@ -144,7 +146,7 @@ Settling SettlingOf(const std::vector<double>& rms) {
   std::ranges::sort(last);
   const double level = Quantile(last, 0.5);
   const auto values = Eigen::VectorXd::Map(rms.data(), n);
-  // Index of the last value whose rms is outside the band, or -1.
+  // Index of the last value whose centred rms is outside the band, or -1.
   std::ptrdiff_t outside = n - kReach - 1;
   for (; outside >= 0; --outside) {
     const std::ptrdiff_t reach = std::min(outside, kReach);

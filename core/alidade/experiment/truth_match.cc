@@ -49,9 +49,9 @@ std::string WhyNoBlock(const StateLayout& layout, const std::vector<StreamInfo>&
     size = block.geometry().ambient;
   }
   if (candidates.empty()) return "no block has this name";
-  if (candidates.size() > 1) return "it could be " + Join(candidates, " or ");
-  if (size == truth.size) return candidates[0] + " already has a truth with the full name";
-  return candidates[0] + " has size " + std::to_string(size) + ", not " +
+  if (candidates.size() > 1) return "the name could mean " + Join(candidates, " or ");
+  if (size == truth.size) return candidates[0] + " already has a truth with its full name";
+  return candidates[0] + " has size " + std::to_string(size) + ", but the truth has size " +
          std::to_string(truth.size);
 }
 

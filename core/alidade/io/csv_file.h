@@ -11,8 +11,8 @@
 
 namespace alidade::internal {
 
-/// CSV file that is written cell by cell, with commas and line feeds. A number has the shortest
-/// form that is read back exactly. A text is quoted if RFC 4180 requires quotes.
+/// CSV file that is written cell by cell, with commas and line feeds. A number is written with the
+/// fewest digits that parse to the same value. A text is quoted if RFC 4180 requires quotes.
 class CsvFile {
  public:
   /// Creates the file with its header. Errors: kCannotCreate, kIo.
@@ -26,9 +26,9 @@ class CsvFile {
   CsvFile& Landmark(std::int64_t id);
   CsvFile& Text(std::string_view value);
   CsvFile& Empty(std::size_t cells = 1);
-  /// Appends `values`, then empty cells up to `width`.
+  /// Appends `count` values and then `width` - `count` empty cells.
   CsvFile& Numbers(const double* values, std::size_t count, std::size_t width);
-  /// Ends the row, which must have a cell for each column. Error: kIo.
+  /// Ends the row, which must have one cell for each column. Error: kIo.
   void EndRow();
   void Close();
 

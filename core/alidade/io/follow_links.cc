@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 
 fs::path FollowLinks(const fs::path& path, const PathVisitor& visit) {
   constexpr int kMaxLinks = 40;
-  std::vector<fs::path> pending;  // parts that are not yet resolved, the next one last
+  std::vector<fs::path> pending;  // unresolved parts, in reverse order
   const auto push = [&](const fs::path& added) {
     std::vector<fs::path> parts(added.begin(), added.end());
     std::erase_if(parts, [](const fs::path& part) { return part.empty() || part == "."; });

@@ -9,9 +9,9 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns the reason in the message of a parser error, such as `syntax error while parsing value -
-/// invalid literal`. Omits the error number and position before it, and the quoted bytes and tokens
-/// after it.
+/// Returns the reason that the message of a parser error contains, such as `syntax error while
+/// parsing value - invalid literal`. Omits the error number and the position, which precede the
+/// reason, and the quoted bytes and tokens, which follow the reason.
 std::string ReasonOf(const Json::exception& error) {
   const std::string message = error.what();
   const std::size_t position = message.find(": ");
@@ -33,7 +33,7 @@ Json ParseJson(std::string_view text, const std::string& file) {
   try {
     return Json::parse(text);
   } catch (const Json::parse_error& error) {
-    // `byte` counts from 1 and is one beyond the end if the text is incomplete.
+    // `byte` is numbered from 1. If the text is incomplete, `byte` is the size of the text plus 1.
     const std::size_t offset =
         std::min(error.byte - std::min<std::size_t>(error.byte, 1), text.size());
     const std::string_view preceding = text.substr(0, offset);
@@ -42,7 +42,7 @@ Json ParseJson(std::string_view text, const std::string& file) {
     const Place place{file, static_cast<int>(line), static_cast<int>(column)};
     throw Error(ExitCode::kBadData, ErrorLine(place, {}, ReasonOf(error), "JSON"));
   } catch (const Json::exception& error) {
-    // A number exceeds the range of a double. Its position is unknown.
+    // A number exceeds the range of a double. The position of the number is unknown.
     throw Error(ExitCode::kBadData, ErrorLine(Place{file}, {}, ReasonOf(error), "JSON"));
   }
 }

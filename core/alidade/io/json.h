@@ -11,15 +11,17 @@ namespace alidade::internal {
 /// Json includes <nlohmann/json.hpp>.
 using Json = nlohmann::ordered_json;
 
-/// Returns the text of `json`, indented by two spaces for each level. Doubles are read back
-/// exactly. Numbers that are not finite become null, and bytes that are not UTF-8 become U+FFFD.
+/// Returns the text of `json`, indented by two spaces for each level. The text of a double parses
+/// to the same double. Numbers that are not finite become null. Bytes that are not UTF-8 become
+/// U+FFFD.
 std::string JsonText(const Json& json);
 
-/// Returns `text` as a JSON string. The destructor of a Json list or map allocates memory, and ends
-/// the program if none is left. Texts that are composed from such strings avoid this.
+/// Returns `text` as a JSON string. Code that composes its output from such strings needs no Json
+/// list or map. The destructor of a Json list or map allocates memory, and ends the program if
+/// memory runs out.
 std::string JsonString(std::string_view text);
 
-/// Parses `text`, the contents of `file`. Errors: kBadData with the line and column.
+/// Parses `text`, which was read from `file`. Error: kBadData with the line and column.
 Json ParseJson(std::string_view text, const std::string& file);
 
 }  // namespace alidade::internal

@@ -16,24 +16,24 @@
 
 namespace alidade {
 
-/// Reader of a file, pipe or standard input, line by line, in constant memory.
+/// Reader of a file, pipe or standard input. It reads line by line in constant memory.
 ///
-/// A byte order mark and carriage returns before line feeds are dropped. Errors:
+/// It drops a byte order mark, and carriage returns before line feeds. Errors:
 ///
 ///   kBadData   a line is longer than kMaxLine
 ///   kIo        a read failed, or a regular file changed while it was read
 ///   kStopped   a signal interrupted the wait for data
 class LineReader {
  public:
-  /// Maximum length of a line in bytes, without its line end.
+  /// Maximum length of a line in bytes. The line end does not count.
   static constexpr std::size_t kMaxLine = 4096;
 
-  /// Opens `path`, or standard input if it is `-`. Blocks on a pipe until it has a writer.
-  /// Errors: kInputMissing at `place` and `key`.
+  /// Opens `path`, or standard input if `path` is `-`. Blocks on a named pipe until another process
+  /// opens the pipe for writing. Error: kInputMissing, whose message contains `place` and `key`.
   LineReader(const std::filesystem::path& path, const Place& place, const std::string& key)
       : is_standard_input_(path == "-"), name_(is_standard_input_ ? "<stdin>" : path.string()) {
     const auto fail = [&](const char* reason) {
-      const std::string problem = '\'' + name_ + "': " + reason;
+      const std::string problem = "cannot read '" + name_ + "': " + reason;
       throw Error(ExitCode::kInputMissing, ErrorLine(place, key, problem, "a readable file"));
     };
     descriptor_ = is_standard_input_ ? STDIN_FILENO : open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -59,7 +59,8 @@ class LineReader {
   /// Returns true for a regular file, which can be read twice, unlike a pipe.
   bool is_regular() const { return S_ISREG(initial_status_.st_mode); }
 
-  /// Reads the next line, which is valid until the next call. Returns false at the end.
+  /// Reads the next line into `line`, which is valid until the next call. Returns false at the end
+  /// of the file.
   bool Next(std::string_view& line) {
     std::size_t scanned = 0;
     for (;;) {
@@ -73,7 +74,7 @@ class LineReader {
     }
   }
 
-  /// Returns to the start of a regular file.
+  /// Moves back to the start of a regular file.
   void Rewind() {
     if (lseek(descriptor_, start_, SEEK_SET) < 0) FailIo(std::strerror(errno));
     begin_ = end_ = 0;
@@ -83,7 +84,7 @@ class LineReader {
 
  private:
   static constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  // The 1 is for '\r'.
+  // The additional byte is '\r'.
   static constexpr std::size_t kMaxBytes = kMaxLine + kByteOrderMark.size() + 1;
 
   /// Moves a line of `length` bytes from the buffer to `line`. Returns true.
@@ -96,7 +97,7 @@ class LineReader {
     if (line.ends_with('\r')) line.remove_suffix(1);
     if (line.size() <= kMaxLine) return true;
     throw Error(ExitCode::kBadData,
-                ErrorLine(Place{name_, number_, 1}, {}, "line too long",
+                ErrorLine(Place{name_, number_, 1}, {}, "the line is too long",
                           "at most " + std::to_string(kMaxLine) + " bytes per line"));
   }
 
@@ -119,7 +120,7 @@ class LineReader {
     const bool is_unchanged = status.st_size == initial_status_.st_size &&
                               status.st_mtim.tv_sec == initial_status_.st_mtim.tv_sec &&
                               status.st_mtim.tv_nsec == initial_status_.st_mtim.tv_nsec;
-    if (!is_unchanged) FailIo("changed while it was read");
+    if (!is_unchanged) FailIo("the file changed while it was read");
   }
 
   [[noreturn]] void FailIo(const char* problem) const {

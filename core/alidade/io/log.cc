@@ -34,8 +34,8 @@ thread_local bool in_log_sink = false;
 /// Innermost scope of this thread.
 thread_local const LogScope* log_scope = nullptr;
 
-/// Lowest level that any sink receives. For a message below this level, Log() only loads this
-/// variable.
+/// Lowest level that at least one sink receives. Log() returns early for a message
+/// below this level.
 std::atomic<int> lowest_log_level{static_cast<int>(LogLevel::kOff)};
 
 /// Logger of the library.
@@ -90,7 +90,8 @@ std::optional<LogLevel> LogLevelOf(std::string_view name) {
   return static_cast<LogLevel>(position - kLogLevelNames.begin());
 }
 
-/// spdlog sink that calls a function. It needs no lock, because the sink that contains it locks.
+/// spdlog sink that calls a function. It needs no lock, because the dist_sink that contains it is
+/// locked during each call.
 class LogSubscription::Sink : public spdlog::sinks::sink {
  public:
   explicit Sink(LogSink function) : function_(std::move(function)) {}

@@ -7,20 +7,21 @@
 #include <string>
 #include <string_view>
 
-/// Log: messages from the library to a person. The library also returns every result and throws
-/// every error; neither depends on the log. Without a sink nothing is printed. All functions of
-/// this header are thread-safe.
+/// Log: messages of the library for a person. Results and errors do not depend on the log: the
+/// library returns every result and throws every error. Without a sink, nothing is printed. All
+/// functions of this header are thread-safe.
 namespace alidade {
 
 enum class LogLevel { kTrace, kDebug, kInfo, kWarning, kError, kOff };
 /// Returns `trace`, `debug`, `info`, `warning`, `error` or `off`.
 const char* ToString(LogLevel level);
-/// Returns the level with that name; nullopt for an unknown name.
+/// Returns the level called `name`; nullopt if the name is unknown.
 std::optional<LogLevel> LogLevelOf(std::string_view name);
 
-/// Receiver of messages, each with its level and its text without a line end. Calls do not overlap.
-/// A sink that throws receives no further messages. Messages that a sink logs itself are dropped. A
-/// sink must not create or destroy a LogSubscription: that would deadlock.
+/// Function that receives each message: the level, and the text without a line end. Calls do not
+/// overlap. A sink that throws receives no further messages. Messages that a sink itself logs are
+/// dropped. A sink must not create or destroy a LogSubscription, because this would cause a
+/// deadlock.
 using LogSink = std::function<void(LogLevel level, std::string_view text)>;
 
 /// Subscription of a sink. It ends when the object is destroyed.
@@ -37,9 +38,9 @@ class LogSubscription {
   std::shared_ptr<Sink> sink_;
 };
 
-/// Logging scope of one run among many. While the object exists, messages of this thread begin with
-/// `prefix`, and levels above `highest` are reduced to `highest`. The innermost scope replaces the
-/// outer ones.
+/// Logging scope that identifies one run among several runs. While the object exists, messages of
+/// this thread begin with `prefix`, and levels above `highest` are reduced to `highest`. Within
+/// nested scopes, only the innermost scope applies.
 class LogScope {
  public:
   LogScope(std::string prefix, LogLevel highest);
@@ -56,7 +57,7 @@ class LogScope {
   const LogScope* outer_;
 };
 
-/// Returns true if a sink receives messages of that level. If it returns false, the caller need not
+/// Returns true if at least one sink receives messages of this level. Otherwise the caller need not
 /// compose the message.
 bool IsLogged(LogLevel level);
 

@@ -20,13 +20,13 @@ namespace alidade {
 /// lines that begin with `#`. In `NAME.partial`, the folder of an unfinished run, it also skips a
 /// last row without a line end.
 ///
-/// Errors       kBadData with file, line and column; those of LineReader.
+/// Errors       kBadData with file, line and column; the errors of LineReader.
 class NumberRows {
  public:
   static constexpr char kCommaOrBlanks = '\0';
 
-  /// The separator ' ' means any number of blanks. kCommaOrBlanks means commas in a row that
-  /// contains a comma, and blanks in any other row.
+  /// The separator ' ' means one or more blanks. The separator kCommaOrBlanks means commas in a row
+  /// that contains a comma, and blanks in any other row.
   NumberRows(const std::filesystem::path& path, const Place& place, const std::string& key,
              char separator = ',')
       : reader_(path, place, key), separator_(separator) {
@@ -52,17 +52,19 @@ class NumberRows {
     }
     return false;
   }
-  /// Fails unless the row has `count` columns. The message lists their names, `columns`.
+  /// Fails unless the row has `count` columns. The message contains `columns`, which describes
+  /// the expected columns.
   void ExpectColumns(std::size_t count, const std::string& columns) const {
     if (cells_.size() == count) return;
     const bool is_short = cells_.size() < count;
     const std::size_t column = is_short ? line_.size() + 1 : Column(count);
     Fail(column, {},
-         (is_short && reader_.is_unterminated() ? "the last line is cut short: " : "") +
+         (is_short && reader_.is_unterminated() ? "the last line is cut short: it has "
+                                                : "the row has ") +
              std::to_string(cells_.size()) + (cells_.size() == 1 ? " column" : " columns"),
          std::to_string(count) + ", " + columns);
   }
-  /// Returns the finite number in column i. Messages call the column `name`.
+  /// Returns the finite number in column i. Messages use `name` as the name of the column.
   double Number(std::size_t i, const char* name) const {
     double value = 0.0;
     const char* const problem = cell::ParseNumber(text(i), value);
@@ -83,14 +85,14 @@ class NumberRows {
     if (value < 0) FailCell(i, name, "is negative", expected);
     return value;
   }
-  /// Returns the time in column i, in seconds and exact to the ns.
+  /// Returns the time in column i, which is in seconds. The result is exact to the nanosecond.
   Timestamp Time(std::size_t i, const char* name) const {
     const double t_s = Number(i, name);
     if (!(std::abs(t_s) < cell::kTimeLimit)) FailCell(i, name, "is beyond 292 years", "seconds");
     return cell::ParseTimestamp(text(i), t_s, 9);
   }
 
-  /// Throws an error about column i, which the message calls `name`.
+  /// Throws an error about column i. The message uses `name` as the name of the column.
   [[noreturn]] void FailCell(std::size_t i, const char* name, const std::string& problem,
                              std::string_view expected) const {
     Fail(Column(i), name, '\'' + cell::PrintableStart(text(i)) + "' " + problem, expected);
@@ -139,8 +141,8 @@ class NumberRows {
 /// Columns 1 to 7 of a trajectory in TUM format. Column 0 is the time in s.
 inline constexpr std::array<const char*, 7> kTumPose = {"x", "y", "z", "qx", "qy", "qz", "qw"};
 
-/// Returns columns 1 to 7: x y z and a quaternion, whose length must not differ from 1 by more than
-/// 1e-3. Messages call the columns `names`.
+/// Returns columns 1 to 7: x y z and a quaternion. Fails if the length of the quaternion differs
+/// from 1 by more than 1e-3. Messages use `names` as the names of the columns.
 inline std::array<double, 7> PoseNumbers(const NumberRows& rows,
                                          const std::array<const char*, 7>& names) {
   std::array<double, 7> values{};
@@ -150,7 +152,7 @@ inline std::array<double, 7> PoseNumbers(const NumberRows& rows,
     if (i >= 3) length2 += values[i] * values[i];
   }
   if (std::abs(std::sqrt(length2) - 1.0) <= 1e-3) return values;
-  rows.FailLine("quaternion of length " + std::to_string(std::sqrt(length2)),
+  rows.FailLine("the length of the quaternion is " + std::to_string(std::sqrt(length2)),
                 "a length within 1e-3 of 1");
 }
 

@@ -52,7 +52,7 @@ void OutputFile::Write(std::string_view text) {
 }
 
 void OutputFile::Flush() {
-  // Further rows after a gap would be misleading.
+  // A write failed. Further rows after the gap would be misleading.
   if (fd_ < 0) FailIo(path_.string(), "write", error_);
   for (std::string_view remaining = buffer_; !remaining.empty();) {
     const ssize_t written = ::write(fd_, remaining.data(), remaining.size());

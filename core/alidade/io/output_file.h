@@ -10,15 +10,15 @@
 
 namespace alidade::internal {
 
-/// File that is written sequentially and reports every write error. A text is buffered. A later
-/// Write() flushes the buffer if it is a second old.
+/// File that is written sequentially and reports every write error. Write() appends to a buffer. It
+/// flushes the buffer if the buffer is full or the last flush is at least one second old.
 class OutputFile {
  public:
   enum class Mode { kReplace, kAppend };
 
-  /// Creates `file`, or opens one that exists. Errors: kCannotCreate, kIo.
+  /// Creates `file`, or opens an existing file. Errors: kCannotCreate, kIo.
   explicit OutputFile(std::filesystem::path file, Mode mode = Mode::kReplace);
-  /// Closes the file without reporting errors, unless Close() was called.
+  /// Closes the file if Close() was not called. Does not report errors.
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
@@ -39,8 +39,8 @@ class OutputFile {
   int error_ = 0;  ///< errno of the write that failed
 };
 
-/// Throws an Error because `path` cannot be created: kIo if the disk is full or failed, else
-/// kCannotCreate.
+/// Throws the Error that `path` cannot be created. The code is kIo if the disk is full or failed,
+/// otherwise kCannotCreate.
 [[noreturn]] void FailCreate(const std::string& path, int error_number);
 /// Throws an Error kIo with the text `PATH: cannot VERB: REASON`.
 [[noreturn]] void FailIo(const std::string& path, const char* verb, int error_number);

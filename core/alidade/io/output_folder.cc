@@ -29,7 +29,8 @@ bool Exists(const fs::path& path) {
   return fs::exists(fs::symlink_status(path, error));
 }
 
-/// Returns `target` without a trailing slash. Resolves a link, `.` and `..` to the folder.
+/// Returns `target` without a trailing slash. If the last part is a link, `.` or `..`, returns the
+/// folder to which it refers.
 fs::path Normalised(const fs::path& target) {
   fs::path path = target.lexically_normal();
   if (!path.has_filename()) path = path.parent_path();
@@ -40,7 +41,7 @@ fs::path Normalised(const fs::path& target) {
   }
   if (path.has_filename()) return path;
   throw Error(ExitCode::kCannotCreate,
-              ErrorLine(Place{target.string()}, {}, "is not a name for a folder", "PATH/NAME"));
+              ErrorLine(Place{target.string()}, {}, "is not a valid folder name", "PATH/NAME"));
 }
 
 /// Returns the sorted names of all files and folders in `folder`, at any depth. Error: kIo.
@@ -55,11 +56,11 @@ std::set<std::string> Contents(const fs::path& folder) {
   return names;
 }
 
-/// Returns the names in `folder` that its list does not contain. Omits the contents of a folder
-/// whose name is returned.
+/// Returns the names in `folder` that `files.txt` does not list. If the name of a folder is
+/// returned, the names of its contents are omitted.
 std::vector<std::string> UnlistedNames(const fs::path& folder) {
   std::set<std::string> listed = {kList};
-  std::vector<std::string> listed_folders;  // folders that are listed with all their contents
+  std::vector<std::string> listed_folders;  // folders whose contents count as listed
   std::ifstream stream(folder / kList);
   for (std::string line; std::getline(stream, line);) {
     if (line.ends_with('/')) listed_folders.push_back(line);
@@ -85,7 +86,7 @@ std::string FirstNames(const std::vector<std::string>& names) {
   return text;
 }
 
-/// Refuses to replace a folder with files that its list does not contain.
+/// Refuses to replace a folder that contains files that `files.txt` does not list.
 void CheckListed(const fs::path& folder) {
   std::error_code error;
   if (!fs::exists(folder, error)) {
@@ -96,7 +97,7 @@ void CheckListed(const fs::path& folder) {
   if (foreign.empty()) return;
   if (!Exists(folder / kList)) {
     Refuse(folder, std::string("is not a run folder (it does not contain ") + kList + ')',
-           "--force replaces run folders only; remove it yourself, or choose another folder");
+           "--force replaces only run folders; remove this folder, or choose another folder");
   }
   Refuse(folder, "contains files that alidade did not write: " + FirstNames(foreign),
          "move them, or choose another folder");
@@ -113,8 +114,9 @@ OutputFolder::OutputFolder(const fs::path& target, bool force, bool resume)
   if (Exists(partial_)) {
     if (!force && !resume) {
       Refuse(partial_,
-             "exists already: the command that writes it has ended early or is still running",
-             "add --force to replace it, or remove it");
+             "exists already: another command ended before it completed this folder, or is still "
+             "running",
+             "add --force to replace this folder, or remove it");
     }
     CheckListed(partial_);
     is_retained_ = resume;
@@ -160,7 +162,7 @@ fs::path OutputFolder::Add(const std::string& name) const {
     list.Write(parent.string() + '\n');
   }
   list.Write(name + '\n');
-  list.Close();  // before the file is created, so a killed process leaves no unlisted file
+  list.Close();  // closed first, so that a killed process leaves no unlisted file
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
   if (error) FailCreate(path.parent_path().string(), error.value());
@@ -201,7 +203,7 @@ void OutputFolder::Commit() {
   names.insert(kList);
   std::string list;
   for (const std::string& name : names) list += name + '\n';
-  constexpr const char* kNewList = "files.txt.new";  // the old list remains if the disk is full
+  constexpr const char* kNewList = "files.txt.new";  // if the disk is full, the old list remains
   Write(kNewList, list);
   std::error_code error;
   fs::rename(partial_ / kNewList, partial_ / kList, error);

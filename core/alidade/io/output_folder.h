@@ -16,7 +16,8 @@ namespace alidade::internal {
 class OutputFolder {
  public:
   /// Creates `NAME.partial`, and its parent folders. If `target` is a link to a folder, NAME is
-  /// that folder. With `force`, an existing `NAME.partial` is replaced now and NAME in Commit().
+  /// that folder. With `force`, an existing `NAME.partial` is replaced now, and an existing NAME is
+  /// replaced in Commit().
   /// With `resume`, an existing `NAME.partial` is continued. Errors: kIo; kCannotCreate if one of
   /// the two folders exists without the option that permits it, or contains a file that its
   /// `files.txt` does not list.
@@ -26,9 +27,9 @@ class OutputFolder {
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
 
-  /// Adds `name` to the list, for a file that other code will write. A name that ends in `/` is a
-  /// folder with all its future contents. Creates the parent folders. Returns the path of the file.
-  /// Errors: kCannotCreate, kIo.
+  /// Adds `name` to the list, for a file that other code will write. A name that ends in `/` means
+  /// a folder and all its future contents. Creates the parent folders. Returns the path of the
+  /// file. Errors: kCannotCreate, kIo.
   std::filesystem::path Add(const std::string& name) const;
   /// Creates or replaces a file. Errors: kCannotCreate, kIo.
   std::unique_ptr<OutputFile> Create(const std::string& name) const;
@@ -38,7 +39,7 @@ class OutputFolder {
   void Write(const std::string& name, std::string_view text) const;
   /// Removes a file or folder, if it exists.
   void Remove(const std::string& name) const;
-  /// Retains `NAME.partial` from now on, even if it is not committed, because it contains results.
+  /// Declares that `NAME.partial` contains results. The destructor then retains the folder.
   void Retain() { is_retained_ = true; }
   /// Returns the path of `NAME.partial`.
   const std::filesystem::path& partial() const { return partial_; }
@@ -49,8 +50,8 @@ class OutputFolder {
  private:
   /// Fails if NAME exists and must not be replaced.
   void CheckTarget() const;
-  /// Opens a descriptor of `NAME.partial`, by which exists() detects that another command has
-  /// removed the folder.
+  /// Opens a descriptor of `NAME.partial`. exists() uses the descriptor to detect that another
+  /// command has removed the folder.
   void Open();
   bool exists() const;
 

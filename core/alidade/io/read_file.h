@@ -14,16 +14,17 @@ namespace alidade::internal {
 /// folder, and kIo if a read fails. `error` is the errno.
 using ReadFailure = std::function<void(ExitCode code, int error)>;
 
-/// Callback that checks the beginning of a file before the remainder is read. A file of a wrong
-/// kind may be endless.
+/// Callback that checks the beginning of a file before the remainder is read. The callback can thus
+/// reject a file of a wrong kind, which may be endless.
 using BeginningCheck = std::function<void(std::string_view beginning)>;
 
-/// Returns the bytes of `file`, up to `max_size`. If `fail` does not throw, ReadFile returns the
-/// bytes that were read before the failure.
+/// Returns the bytes of `file`, but at most the first `max_size` bytes. If `fail` does not throw,
+/// ReadFile returns the bytes that were read before the failure.
 std::string ReadFile(const std::filesystem::path& file, const ReadFailure& fail,
                      std::size_t max_size = std::string::npos, const BeginningCheck& check = {});
 
-/// Returns the bytes of an open file or pipe, like ReadFile. Does not close it.
+/// Returns the bytes of an open file or pipe, by the rules of ReadFile. Does not close
+/// `descriptor`.
 std::string ReadDescriptor(int descriptor, const ReadFailure& fail,
                            std::size_t max_size = std::string::npos,
                            const BeginningCheck& check = {});

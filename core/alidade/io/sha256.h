@@ -10,8 +10,8 @@ struct evp_md_ctx_st;  // a type of OpenSSL
 
 namespace alidade::internal {
 
-/// SHA-256 hash (FIPS 180-4) of bytes that are added in several parts. It needs constant memory.
-/// OpenSSL computes it.
+/// SHA-256 hash (FIPS 180-4) of bytes that are added in several parts. OpenSSL computes the hash in
+/// constant memory.
 class Sha256Stream {
  public:
   Sha256Stream();

@@ -11,7 +11,7 @@
 #include "alidade/base/timestamp.h"
 #include "alidade/io/utf8.h"
 
-/// Conversions of the text of a single table cell, independent of the locale.
+/// Conversions of the text of a single table cell. They do not depend on the locale.
 namespace alidade::cell {
 
 /// Returns `text` without surrounding blanks, and then without surrounding quotes.
@@ -37,12 +37,12 @@ inline const char* ParseNumber(std::string_view text, double& value) {
   return std::isfinite(value) ? nullptr : "is not finite";
 }
 
-/// Bound in s on the magnitude of a time (292 years). Every time below this bound fits into a
-/// Timestamp.
+/// Upper bound on the magnitude of a time, in s (292 years). Every time below this bound fits into
+/// a Timestamp.
 inline constexpr double kTimeLimit = 9.2e9;
 
-/// Returns the timestamp nearest to `text`, a decimal number without an exponent, in units of
-/// 10^digits ns. The magnitude of the time must be below kTimeLimit.
+/// Returns the timestamp nearest to the time in `text`. `text` is a decimal number without an
+/// exponent, in units of 10^digits ns. The magnitude of the time must be below kTimeLimit.
 inline Timestamp ExactTimestamp(std::string_view text, std::size_t digits) {
   const bool is_negative = text.starts_with('-');
   if (is_negative || text.starts_with('+')) text.remove_prefix(1);
@@ -57,14 +57,16 @@ inline Timestamp ExactTimestamp(std::string_view text, std::size_t digits) {
   return is_negative ? -ns : ns;
 }
 
-/// Returns the timestamp of `text`, in a unit of 10^digits ns. `value` is the number in `text`. The
-/// result is exact if `text` has no exponent. The magnitude of the time must be below kTimeLimit.
+/// Returns the timestamp for the time in `text`, a number in units of 10^digits ns. `value` is the
+/// same number as a double. The result is exact if `text` has no exponent. The magnitude of the
+/// time must be below kTimeLimit.
 inline Timestamp ParseTimestamp(std::string_view text, double value, std::size_t digits) {
   if (text.find_first_of("eE") == std::string_view::npos) return ExactTimestamp(text, digits);
   return TimestampFromSeconds(value * std::pow(10.0, static_cast<double>(digits) - 9.0));
 }
 
-/// Returns the start of a cell for a message: UTF-8 without control characters.
+/// Returns at most the first 40 bytes of a cell, for a message. Replaces control characters and
+/// invalid bytes by `?`.
 inline std::string PrintableStart(std::string_view cell) {
   constexpr std::size_t kMaxSize = 40;
   const std::string start = internal::PrintableUtf8(cell.substr(0, kMaxSize), "");

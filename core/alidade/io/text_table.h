@@ -12,7 +12,7 @@ using TextRow = std::vector<std::string>;
 /// column that is empty below the first row.
 std::string TextTable(const std::vector<TextRow>& rows, std::size_t indent = 0);
 
-/// Row of a table: a label with its unit, and a cell for each column, `-` for a missing value.
+/// Row of a table: a label with its unit, and one cell for each column. `-` is a missing value.
 struct TableRow {
   std::string label;
   std::vector<std::string> cells;
@@ -30,7 +30,7 @@ Table MakeTable(const std::vector<std::string>& names, const std::vector<TableRo
                 const std::string& corner = "");
 
 enum class TableFormat {
-  kText,      ///< aligns only the first column to the left; wide tables continue below
+  kText,      ///< only the first column is left-aligned; a wide table is split into several parts
   kMarkdown,  ///< special characters are escaped
   kLatex,     ///< a `tabular` environment, which needs no package; special characters are escaped
 };

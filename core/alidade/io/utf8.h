@@ -46,8 +46,8 @@ inline bool IsControl(std::string_view text) {
   return byte(0) < ' ' || byte(0) == 0x7F || (byte(0) == 0xC2 && byte(1) < 0xA0);
 }
 
-/// Returns `text` in printable form: `?` replaces each invalid byte, and each control character
-/// that is not in `allowed_controls`.
+/// Returns `text` in printable form. Replaces each invalid byte by `?`, and each control character
+/// unless `allowed_controls` contains it.
 inline std::string PrintableUtf8(std::string_view text, std::string_view allowed_controls) {
   std::string printable;
   while (!text.empty()) {

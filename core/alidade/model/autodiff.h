@@ -9,13 +9,15 @@
 #include "alidade/model/model_members.h"
 #include "alidade/model/status.h"
 
-/// Evaluates models and their Jacobians in the tangent space. If the model has analytic Jacobians,
-/// they are used. Otherwise forward-mode automatic differentiation through (+) and (-) computes the
-/// Jacobians. Plugins, the static filter, costs of a batch and tests share this code. Matrices are
-/// row-major with a row stride. Outputs are unchanged unless the result is kOk.
+/// Evaluation of models and their Jacobians in the tangent space. If a model defines analytic
+/// Jacobians, these functions call them. Otherwise, they compute the Jacobians by forward-mode
+/// automatic differentiation through (+) and (-). Plugins, StaticEkf, the costs of the batch and
+/// tests share this code. Matrices are row-major with a row stride. Outputs are unchanged unless
+/// the result is kOk.
 
-/// Disables vectorised loops in a function. A model has just written its outputs as single numbers.
-/// Vector loads of these outputs would have to wait for the stores.
+/// Disables the vectorisation of loops in a function that copies the outputs of a model. The model
+/// writes its outputs as single numbers. A vector load of several outputs would stall until these
+/// stores have completed.
 #if defined(__GNUC__) && !defined(__clang__)
 #define ALIDADE_SCALAR_LOOPS __attribute__((optimize("no-tree-loop-vectorize")))
 #else
@@ -23,7 +25,7 @@
 #endif
 
 /// Inlines all callees into a function, including the arithmetic of the model. Disabled if
-/// sanitizers are active, because the compiler would then need minutes and gigabytes.
+/// sanitizers are active, because compilation would then need minutes and gigabytes of memory.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define ALIDADE_FLATTEN
 #else
@@ -42,7 +44,8 @@ template <class G, class Jet>
 void LiftBlock(const double* x, int seed, Jet* lifted) {
   if constexpr (G::kGeometry == ALIDADE_VECTOR) {
     for (int k = 0; k < G::kTangent; ++k) lifted[k] = Jet(x[k], seed + k);
-  } else if constexpr (G::kGeometry == ALIDADE_UNIT_QUATERNION) {  // x Exp(d) = x (1, d/2)
+  } else if constexpr (G::kGeometry == ALIDADE_UNIT_QUATERNION) {
+    // To first order, x Exp(d) = x (1, d/2).
     const double w = 0.5 * x[0], i = 0.5 * x[1], j = 0.5 * x[2], k = 0.5 * x[3];
     const double slope[4][3] = {{-i, -j, -k}, {w, -k, j}, {k, w, -i}, {-j, i, w}};
     for (int r = 0; r < 4; ++r) {
@@ -56,8 +59,9 @@ void LiftBlock(const double* x, int seed, Jet* lifted) {
   }
 }
 
-/// Computes x (+) 0 of all blocks in dual numbers. Each block has its own variables, numbered in
-/// the order of the blocks. Blocks for which kSkip is true have no dual numbers and no variables.
+/// Computes x (+) 0 of all blocks in dual numbers. Each block has its own variables, which are
+/// numbered in the order of the blocks. A block for which kSkip returns true has no dual numbers
+/// and no variables; its pointer is null.
 template <class Model, bool (*kSkip)(int) = SkipNone, class Jet>
 void Lift(const double* const* x, Jet* lifted, const Jet** pointers) {
   int seed = 0, offset = 0;
@@ -75,8 +79,8 @@ void Lift(const double* const* x, Jet* lifted, const Jet** pointers) {
   ForEach(lift, typename Blocks<Model>::Indices{});
 }
 
-/// Reads the derivatives of a value by the variables [first, first + count), in the tangent space
-/// of G at the value.
+/// Reads the derivatives of a value with respect to the variables [first, first + count), in the
+/// tangent space of G at the value.
 template <class G, class Jet>
 void ReadTangent(const Jet* value, int first, int count, MatrixRef j) {
   if constexpr (G::kGeometry == ALIDADE_VECTOR) {
@@ -109,8 +113,8 @@ void CopyUnrolled(MatrixRef source, MatrixRef destination, std::index_sequence<I
 }
 
 /// Copies a matrix whose size is known at compile time. A small matrix is copied number by number,
-/// so that it can stay in registers. A load of two numbers cannot be forwarded from two separate
-/// stores: the load would wait until both have left the store buffer.
+/// so that it can remain in registers. A load of two numbers cannot be forwarded from two separate
+/// stores: the load would wait until both stores have left the store buffer.
 template <int kRows, int kColumns>
 void CopyFixed(MatrixRef source, MatrixRef destination) {
   if constexpr (kRows * kColumns <= 64) {
@@ -127,8 +131,8 @@ bool CallPredict(const Model& model, const T* const* x, const double* known, T* 
   return WithRoles<Model>(predict, x, known, indices, z);
 }
 
-/// Computes analytic Jacobians in a buffer first. If Jacobian throws, `jacobians` is therefore
-/// unchanged.
+/// Computes the analytic Jacobians in a buffer and then copies them. `jacobians` is therefore
+/// unchanged if Model::Jacobian throws.
 template <class Model, std::size_t... I>
 void AnalyticJacobians(const Model& model, const double* const* x, const double* known,
                        double* const* jacobians, const int* strides,
@@ -158,8 +162,8 @@ void AnalyticJacobians(const Model& model, const double* const* x, const double*
 }  // namespace detail
 
 /// Computes z = h(roles). Unless `jacobians` is null, also computes jacobians[i] = d z / d role_i,
-/// except for null entries and unbound roles. `known` are the known numbers of the measurement,
-/// which only models with kKnown use.
+/// except for null entries and unbound roles. `known` contains the known numbers of the
+/// measurement; only models with kKnown use them.
 template <class Model>
 Status Evaluate(const Model& model, const double* const* roles, double* z, double* const* jacobians,
                 const int* strides, const double* known = nullptr) {
@@ -204,8 +208,8 @@ Status Evaluate(const Model& model, const double* const* roles, double* z, doubl
 namespace detail {
 
 /// Calls step(next) and returns its result. If all blocks have a static size, the step writes to a
-/// buffer, so that `next` is unchanged if the step fails or throws. Models with dynamic blocks must
-/// ensure this themselves.
+/// buffer, so that `next` is unchanged if the step fails or throws. The step of a model with
+/// dynamic blocks writes directly to `next`, and must not change `next` if it fails.
 template <class Model, class F>
 bool CallBuffered(double* const* next, const F& step) {
   using Blocks = detail::Blocks<Model>;
@@ -232,7 +236,8 @@ bool CallBuffered(double* const* next, const F& step) {
   }
 }
 
-/// Computes F and G by StepJacobian of the model. Uses a buffer in the same way as CallBuffered.
+/// Computes F and G by StepJacobian of the model. If all sizes are static, the matrices are first
+/// computed in buffers, so that `f` and `g` are unchanged if StepJacobian throws.
 template <class Model, std::size_t... I>
 void AnalyticStep(const Model& model, const double* const* x, const double* w, double dt_s,
                   MatrixRef f, MatrixRef g, std::index_sequence<I...>) {
@@ -322,7 +327,7 @@ Status InputJets(const Model& model, const double* const* x, const double* u, co
   return Status::kOk;
 }
 
-/// Calls f(w) with w = 0 of the size of the model's noise.
+/// Calls f(w) with w = 0. The size of w is the size of the model's noise.
 template <class Model, class F>
 Status WithZeroNoise(const Model& model, const F& f) {
   if constexpr (Model::kNoise == kDynamic) {
@@ -367,7 +372,7 @@ Status Step(const Model& model, const double* const* x, const double* u, const d
             double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
   static_assert(detail::CheckMotionMembers<Model>());
   const int n = detail::TangentSizeOf(model), n_w = detail::NoiseSizeOf(model);
-  std::vector<double> unused;  // used only if the caller requests only F or only G
+  std::vector<double> unused;  // receives the Jacobian that the caller does not request
   if (static_cast<bool>(f) != static_cast<bool>(g) && n_w > 0) {
     unused.resize(static_cast<std::size_t>(n) * std::max(n, n_w));
     (f ? g : f) = MatrixRef{unused.data(), f ? n_w : n};
@@ -378,7 +383,8 @@ Status Step(const Model& model, const double* const* x, const double* u, const d
   return w != nullptr ? step(w) : detail::WithZeroNoise(model, step);
 }
 
-/// Does the same, and also computes B = d x' / d u (n x n_u) of a model with a control input.
+/// Computes x', F and G like the function above, and also B = d x' / d u (n x n_u). The model must
+/// have a control input.
 template <class Model>
 Status Step(const Model& model, const double* const* x, const double* u, const double* w,
             double dt_s, double* const* next, MatrixRef f, MatrixRef g, MatrixRef b) {

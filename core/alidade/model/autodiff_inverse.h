@@ -7,7 +7,7 @@
 namespace alidade {
 namespace detail {
 
-/// Sizes of y, which contains the roles that Initialise computes.
+/// Ambient and tangent size of y, which contains the roles that Initialise computes.
 template <class Model>
 struct InitialisedSizes {
   static constexpr int Sum(bool ambient) {
@@ -48,7 +48,7 @@ bool CallInitialise(const Model& model, const T* const* x, const double* known, 
   }
 }
 
-/// Reads the derivatives of y by the variables [first, first + count), role by role.
+/// Reads the derivatives of y with respect to the variables [first, first + count), role by role.
 template <class Model, class Jet>
 void ReadInitialised(const Jet* y, int first, int count, MatrixRef j) {
   int offset = 0, row = 0;
@@ -66,10 +66,10 @@ void ReadInitialised(const Jet* y, int first, int count, MatrixRef j) {
 }  // namespace detail
 
 /// Evaluates the inverse measurement model: computes y from the other roles, z and the prior. y is
-/// the value of the role Model::kInitialises. For a landmark, y contains the values of all its
+/// the value of the role Model::kInitialises. For a landmark, y contains the values of all landmark
 /// roles, one after the other. Also computes the Jacobians jx[i] = d y / d role_i, jz = d y / d z
-/// and jp = d y / d prior. Each of them may be null. Returns kInvalid if the model needs a prior
-/// and `prior` is null. `known` is the same as in Evaluate.
+/// and jp = d y / d prior. Each Jacobian may be null. Returns kInvalid if the model needs a prior
+/// and `prior` is null. `known` has the same meaning as in Evaluate.
 template <class Model>
 Status InitialiseRole(const Model& model, const double* const* roles, const double* z,
                       const double* prior, double* y, double* const* jx, const int* jx_strides,

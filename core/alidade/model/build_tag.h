@@ -6,8 +6,8 @@
 
 #include "alidade/model/plugin_abi.h"
 
-/// Build tag: describes how a binary was built. It can be read from the file without loading the
-/// library.
+/// Build tag, which describes how a plugin was built. It can be read from the file of the plugin
+/// before the file is loaded.
 namespace alidade::detail {
 
 template <std::size_t N>
@@ -15,8 +15,8 @@ constexpr void CopyText(const char* text, char (&destination)[N]) {
   for (std::size_t i = 0; i + 1 < N && text[i] != '\0'; ++i) destination[i] = text[i];
 }
 
-/// Returns the flags ALIDADE_ISA_* of instruction sets with registers of up to 256 bits. Includes
-/// those that the compiler may use without intrinsics in this translation unit.
+/// Returns the flags ALIDADE_ISA_* of the instruction sets that the compiler may use in this
+/// translation unit, also without intrinsics. Covers the sets with registers of up to 256 bits.
 constexpr std::uint32_t InstructionSetsTo256() {
   std::uint32_t isa = 0;
 #if defined(__SSE3__)
@@ -61,7 +61,7 @@ constexpr std::uint32_t InstructionSetsTo256() {
   return isa;
 }
 
-/// Returns the flags ALIDADE_ISA_* of all other instruction sets.
+/// Returns these flags for all other instruction sets, such as AVX-512.
 constexpr std::uint32_t InstructionSetsBeyond256() {
   std::uint32_t isa = 0;
 #if defined(__AVX512F__)
@@ -172,8 +172,8 @@ constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N], const AlidadeBuil
 
 }  // namespace alidade::detail
 
-/// Defines the build tag in its section of the binary. `kind` is ALIDADE_PLUGIN_*. `build` is a
-/// text that must equal the text of the host.
+/// Defines the build tag in the section ALIDADE_BUILD_TAG_SECTION. `kind` is ALIDADE_PLUGIN_*.
+/// `build` is ALIDADE_CPP_ABI for a C++ plugin and "" for a C-ABI plugin.
 #define ALIDADE_BUILD_TAG(kind, build)                                                    \
   extern "C" {                                                                            \
   __attribute__((section(ALIDADE_BUILD_TAG_SECTION), used,                                \
@@ -181,7 +181,8 @@ constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N], const AlidadeBuil
       alidade::detail::MakeBuildTag(kind, build);                                         \
   }
 
-/// Defines the names of the constexpr array `entries` in their section of the binary.
+/// Stores the names of the entries in the section ALIDADE_NAMES_SECTION. `entries` is a constexpr
+/// array.
 #define ALIDADE_ENTRY_NAMES(entries)                                                          \
   __attribute__((section(ALIDADE_NAMES_SECTION), used)) static constexpr auto alidade_names = \
       alidade::detail::NamesOf<alidade::detail::SizeOfNames(entries)>(entries);

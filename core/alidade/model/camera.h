@@ -7,11 +7,12 @@
 #include "alidade/model/params.h"
 #include "alidade/model/radial_polynomial.h"
 
-/// Camera models, which map rays to pixels and pixels to rays. The scalar is a template parameter:
-/// double or a dual number. Derivatives are also correct if an equation is solved by iteration.
+/// Camera models, which map rays to pixels and pixels to rays. The scalar type is a template
+/// parameter: double or a dual number. The derivatives are also exact if a function solves an
+/// equation by iteration.
 namespace alidade {
 
-/// Projection with its lens distortion. All except kPinhole have radial coefficients k.
+/// Projection and lens distortion. All models except kPinhole have radial coefficients k.
 enum class CameraModel { kPinhole, kRadtan, kEquidistant, kPhotogrammetric };
 
 /// Camera with projection, lens distortion and image size.
@@ -34,12 +35,14 @@ enum class CameraModel { kPinhole, kRadtan, kEquidistant, kPhotogrammetric };
 ///   p1, p2        1      -     -      tangential distortion of radtan
 ///
 /// radtan and equidistant equal the models of OpenCV and Kalibr. photogrammetric is the model of
-/// MonoSLAM with two parameters. Only its inverse, from pixel to ray, has a closed form. In the
-/// literature, its k1 is often in 1/mm^2 and k2 in 1/mm^4, on the image sensor. Multiply k1 by the
-/// squared focal length in mm, and k2 by the fourth power of the focal length.
+/// MonoSLAM with two parameters. Only the inverse of this model, from pixel to ray, has a closed
+/// form. In the literature, k1 is often in 1/mm^2 and k2 in 1/mm^4, for lengths on the image
+/// sensor. To convert them, multiply k1 by the squared focal length in mm, and k2 by the fourth
+/// power of the focal length in mm.
 ///
-/// Defined for  hz > 0 (equidistant: h not on the negative z axis), within the radius up to which
-///              the distorted radius increases, so that no two rays share a pixel.
+/// Defined for  hz > 0 (equidistant: h not on the negative z axis). The radius must be within the
+///              range in which the distorted radius increases. Within this range, no two rays share
+///              a pixel.
 /// Source       [Brown1971], [Kannala2006]; photogrammetric [Civera2008].
 struct Camera {
   CameraModel model;
@@ -89,25 +92,25 @@ struct Camera {
     h[2] = T(1.0);
     return Undistort(x, h);
   }
-  /// Returns whether the pixel z = (u, v) is inside the image.
+  /// Returns true if the pixel z = (u, v) is inside the image.
   bool Contains(const double* z) const {
     return z[0] >= -0.5 && z[0] <= width - 0.5 && z[1] >= -0.5 && z[1] <= height - 0.5;
   }
 
  private:
   static constexpr double kPi = 3.14159265358979323846;
-  static constexpr double kMaxSquaredRadius = 1e4;  ///< limit of x0^2 + y0^2: 89.4 degrees
+  static constexpr double kMaxSquaredRadius = 1e4;  ///< limit of x0^2 + y0^2 (89.4 deg)
   static constexpr double kSmallSquaredAngle =
-      1e-6;  ///< rad^2; below this, series replace the functions
+      1e-6;  ///< rad^2; below this limit, power series replace sin, cos and atan2
 
   Camera(Params& params, CameraModel type)
       : Camera(params.Integer("camera.width", "image width in px", 1, 1 << 20),
                params.Integer("camera.height", "image height in px", 1, 1 << 20),
-               params.Positive("camera.fx", "px", "focal length, horizontal"),
-               params.Positive("camera.fy", "px", "focal length, vertical"),
-               params.Number("camera.cx", "px", "principal point"),
-               params.Number("camera.cy", "px", "principal point"), type, ReadRadial(params, type),
-               ReadTangential(params, type)) {}
+               params.Positive("camera.fx", "px", "horizontal focal length"),
+               params.Positive("camera.fy", "px", "vertical focal length"),
+               params.Number("camera.cx", "px", "u of the principal point"),
+               params.Number("camera.cy", "px", "v of the principal point"), type,
+               ReadRadial(params, type), ReadTangential(params, type)) {}
   static std::array<double, 4> ReadRadial(Params& params, CameraModel type) {
     std::array<double, 4> k{};
     if (type == CameraModel::kPinhole) return k;

@@ -16,22 +16,20 @@
 ///   (2)  (x (+) d) (-) x = d          for small d
 ///   (3)  x (+) (y (-) x) = y
 ///
-/// Scalar types are template parameters: double, or a dual number for x, d or both.
+/// The scalar types of x and d are template parameters: double or a dual number.
 ///
-/// A geometry of fixed size is a struct with
+/// A geometry of fixed size has an entry in alidade/state/geometry_table.h, and is a struct with
 ///
-///   kGeometry                number in the C table (plugin_abi.h)
+///   kGeometry                constant of the geometry in plugin_abi.h, such as ALIDADE_ANGLE
 ///   kAmbient, kTangent       number of elements of a value and of d
 ///   kIdentity                the neutral element
 ///   Plus, Minus              the operations (+) and (-)
-///   Normalise(x)             returns x to the manifold after rounding errors
+///   Normalise(x)             removes the rounding errors that move x off the manifold
 ///   Distance(x)              optional: distance of x from the manifold; default: 0
 ///   Transport(x, y, j)       optional: j (kTangent x kTangent, row-major) transports a tangent
 ///                            vector at x to the tangent space of y; default: the identity
-///   PlusJacobian(x, d, j)    optional: j = d(x (+) d)/dd, in the tangent space at x (+) d; default
-///                            automatic differentiation of Plus and Minus
-///
-/// and an entry in alidade/state/geometry_table.h.
+///   PlusJacobian(x, d, j)    optional: j = d(x (+) d)/dd, in the tangent space at x (+) d;
+///                            default: automatic differentiation of Plus and Minus
 namespace alidade {
 
 /// Size of a block if the size is known only at run time.
@@ -83,7 +81,7 @@ struct Angle {
 
 namespace detail {
 
-/// Base of a geometry G whose values have unit length.
+/// Base of a geometry G whose values are vectors of unit length.
 template <class G, int N>
 struct UnitLength {
   /// Replaces x by x / |x|, or by the neutral element if x = 0. Does not change x if |x| is not
@@ -108,8 +106,8 @@ struct UnitLength {
 }  // namespace detail
 
 /// S^3: unit quaternions of Hamilton's convention, stored as w x y z. q (+) d = q Exp(d), with
-/// Exp(d) = (cos |d|/2, sin(|d|/2) d/|d|). q and -q are the same rotation, and (-) returns the
-/// shorter difference, |d| <= pi. Source: [Sola2017] ch. 4.
+/// Exp(d) = (cos |d|/2, sin(|d|/2) d/|d|). q and -q are the same rotation; (-) returns the shorter
+/// of the two differences, with |d| <= pi. Source: [Sola2017] ch. 4.
 struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
   static constexpr std::uint32_t kGeometry = ALIDADE_UNIT_QUATERNION;
   static constexpr int kAmbient = 4, kTangent = 3;
@@ -160,7 +158,7 @@ struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
   /// Computes y = R(q) x.
   template <class Q, class X, class Y>
   static void Rotate(const Q* q, const X* x, Y* y) {
-    // x + 2 q0 (qv x x) + 2 qv x (qv x x)
+    // y = x + q0 t + cross(qv, t) with t = 2 cross(qv, x)
     const Y t[3] = {2.0 * (q[2] * x[2] - q[3] * x[1]), 2.0 * (q[3] * x[0] - q[1] * x[2]),
                     2.0 * (q[1] * x[1] - q[2] * x[0])};
     y[0] = x[0] + q[0] * t[0] + q[2] * t[2] - q[3] * t[1];
@@ -312,8 +310,8 @@ struct UnitVector : detail::UnitLength<UnitVector, 3> {
   }
 };
 
-/// Composite value; each part has its own geometry. Used for measurements with correlated noise,
-/// such as a pose, or a range with a bearing.
+/// Composite value, each part of which has its own geometry. Measurements whose parts have
+/// correlated noise use this geometry, such as a pose, or a range with a bearing.
 template <class... Parts>
 struct Product {
   static_assert(sizeof...(Parts) > 0 && ((Parts::kTangent > 0) && ... && true) &&
@@ -350,7 +348,7 @@ struct HasTransport<G, std::void_t<decltype(G::Transport(
 
 }  // namespace detail
 
-/// Whether the tangent basis of G depends on the point. A covariance must then be rotated when the
+/// True if the tangent basis of G depends on the point. A covariance must then be rotated when the
 /// point moves.
 template <class G>
 inline constexpr bool kHasTransport = detail::HasTransport<G>::value;

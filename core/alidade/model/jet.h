@@ -15,12 +15,12 @@ namespace alidade {
 ///
 /// A constant converts implicitly to a dual number whose derivatives are zero. Comparisons,
 /// isfinite, isnan and isinf use only the value. Call functions by argument-dependent lookup, as in
-/// `using std::sin; sin(x)`. Dual numbers may be elements of Eigen matrices. If a function has no
-/// finite slope, such as sqrt, hypot and atan2 at 0 and asin at 1, the derivatives are infinite or
-/// NaN.
+/// `using std::sin; sin(x)`. Dual numbers may be elements of Eigen matrices. The derivatives are
+/// infinite or NaN at an argument at which a function has no finite slope, such as 0 for sqrt,
+/// hypot and atan2, and 1 for asin.
 template <class T, int N>
 struct Jet {
-  static_assert(std::is_floating_point_v<T> && N > 0, "a number, and at least one variable");
+  static_assert(std::is_floating_point_v<T> && N > 0, "T must be floating-point, and N > 0");
 
   T a{};     ///< value
   T v[N]{};  ///< derivatives
@@ -91,7 +91,7 @@ struct Jet {
     return Chain(std::pow(x.a, p), p == T(0) ? T(0) : p * std::pow(x.a, p - T(1)), x);
   }
   friend Jet pow(const Jet& x, const Jet& p) {
-    if (p.IsConstant()) return pow(x, p.a);  // also defined for x < 0
+    if (p.IsConstant()) return pow(x, p.a);  // this overload is also defined for x < 0
     const T f = std::pow(x.a, p.a);
     const T exponent_slope = f == T(0) ? T(0) : f * std::log(x.a);
     return Chain(f, p.a * std::pow(x.a, p.a - T(1)), x, exponent_slope, p);
@@ -178,7 +178,7 @@ struct Jet {
 
 }  // namespace alidade
 
-/// Numeric limits of a dual number: those of its value type.
+/// Numeric limits of a dual number, which are the limits of its value type.
 template <class T, int N>
 class std::numeric_limits<alidade::Jet<T, N>> : public std::numeric_limits<T> {};
 

@@ -13,12 +13,13 @@
 #include "alidade/model/params.h"
 
 /// Representations of a landmark: ways to store a point of the world in the state. Every
-/// representation is a struct that converts its values y to a ray p = a + m / rho. All other code
-/// uses only this ray:
+/// representation is a struct that converts the stored values y to a ray p = a + m / rho. All other
+/// code uses only this ray:
 ///
 ///   (1)  h = R_CW (rho (a - r) + m) = rho p_in_cam      finite at rho = 0, for a point at infinity
 ///
-/// r is the position of the camera and q = world_from_cam its orientation. A representation has
+/// r is the position of the camera, and q = world_from_cam is the orientation of the camera. A
+/// representation defines
 ///
 ///   using Spaces = std::tuple<...>;                      geometries of its blocks
 ///   static constexpr std::array kRoles{Quantity{...}};   one per block, ALIDADE_ROLE_LANDMARK
@@ -34,13 +35,13 @@ namespace alidade {
 /// Ray to a point p = a + m / rho.
 template <class T>
 struct Ray {
-  T origin[3];     ///< a, m
-  T direction[3];  ///< m
-  T rho;           ///< 1/m if m has unit length
+  T origin[3];     ///< a, in metres
+  T direction[3];  ///< vector m
+  T rho;           ///< inverse distance in 1/m if `direction` has unit length
 };
 
 /// Inverse-depth representation of MonoSLAM. The six numbers are the position of the camera at the
-/// first observation, azimuth and elevation of the ray, and the inverse distance along the ray.
+/// first observation, the azimuth and elevation of the ray, and the inverse distance along the ray.
 ///
 ///   y = (x0, y0, z0, theta, phi, rho),  a = (x0, y0, z0)
 ///   m = (cos phi sin theta, -sin phi, cos phi cos theta)
@@ -56,7 +57,7 @@ struct InverseDepth {
       Quantity{"landmark", "", "anchor in m, azimuth and elevation in rad, inverse distance in 1/m",
                "x0,y0,z0,theta,phi,rho", ALIDADE_ROLE_LANDMARK}};
 
-  /// ToRay converts y to a ray, and FromRay a ray to y.
+  /// ToRay converts y to a ray. FromRay converts a ray to y.
   template <class T>
   static Ray<T> ToRay(const T* y) {
     using std::cos;
@@ -81,8 +82,8 @@ struct InverseDepth {
 };
 
 /// Anchored inverse-distance representation: an anchor a, a unit vector m and the inverse distance
-/// rho from the anchor. Landmarks that were first observed in the same frame share one anchor. Each
-/// landmark therefore adds only three degrees of freedom. The representation has no pole.
+/// rho from the anchor. Landmarks that were first observed in the same time step share one anchor.
+/// Each landmark therefore adds only three degrees of freedom. The representation has no pole.
 ///
 ///   y = (a, m, rho)
 ///
@@ -99,7 +100,7 @@ struct Anchored {
       Quantity{"inverse_distance", "1/m", "inverse distance from the anchor", "",
                ALIDADE_ROLE_LANDMARK}};
 
-  /// ToRay converts y to a ray, and FromRay a ray to y.
+  /// ToRay converts y to a ray. FromRay converts a ray to y.
   template <class T>
   static Ray<T> ToRay(const T* y) {
     return {{y[0], y[1], y[2]}, {y[3], y[4], y[5]}, y[6]};
@@ -114,7 +115,7 @@ struct Anchored {
 };
 
 /// Representation by the coordinates of the point, y = p. The ray has a = p, m = 0 and rho = 1, so
-/// (1) becomes h = R_CW (p - r). FromRay returns false unless rho > 0.
+/// equation (1) becomes h = R_CW (p - r). FromRay returns false unless rho > 0.
 struct Xyz {
   using Spaces = std::tuple<Vec<3>>;
   static constexpr const char* kName = "xyz";
@@ -122,7 +123,7 @@ struct Xyz {
   static constexpr std::array kRoles{Quantity{"landmark", "m", "position of the point in the world",
                                               "x,y,z", ALIDADE_ROLE_LANDMARK}};
 
-  /// ToRay converts y to a ray, and FromRay a ray to y.
+  /// ToRay converts y to a ray. FromRay converts a ray to y.
   template <class T>
   static Ray<T> ToRay(const T* y) {
     return {{y[0], y[1], y[2]}, {T(0.0), T(0.0), T(0.0)}, T(1.0)};
@@ -148,8 +149,8 @@ constexpr bool IsSameText(const char* a, const char* b) {
   return *a == *b;
 }
 
-/// Returns true if two representations have the same blocks, by name and geometry, so that a sensor
-/// cannot be recognised by its roles.
+/// Returns true if the blocks of two representations have the same names and geometries. The roles
+/// of a sensor then do not determine the representation.
 template <class A, class B>
 constexpr bool HaveSameRoles() {
   if constexpr (std::is_same_v<typename A::Spaces, typename B::Spaces>) {
@@ -169,13 +170,13 @@ struct RepresentationTraits<std::tuple<Representations...>> {
       Representations::kName...};
   static constexpr int kMaxTangent = std::max({Blocks<Representations>::kTangent...});
 
-  /// Returns the number of representations that have the roles of R.
+  /// Returns the number of representations that have the same roles as R.
   template <class R>
   static constexpr int CountWithRolesOf() {
     return (HaveSameRoles<R, Representations>() + ...);
   }
   static_assert(((CountWithRolesOf<Representations>() == 1) && ...),
-                "two representations have the same roles: give one a role with another name");
+                "two representations have the same roles: rename a role of one of them");
 
   /// Calls f(Representation{}) for the representation with this index.
   template <class F>
@@ -208,7 +209,7 @@ auto WithRepresentation(LandmarkRepresentation representation, const F& f) {
       static_cast<int>(representation), f);
 }
 
-/// Computes the three elements of h by (1).
+/// Computes the three elements of h by equation (1).
 template <class T>
 void InCamera(const Ray<T>& ray, const T* position, const T* orientation, T* h) {
   T difference[3];
@@ -263,7 +264,7 @@ Status ConvertToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}
 
 /// Returns the linearity index L_d = 4 sigma_rho |cos alpha| / (rho^2 d1) with d1 = |p - r|
 /// [Civera2008] sec. III. alpha is the angle between the rays to p from the anchor and from the
-/// camera at r; sigma_rho is in 1/m. L_d is small if the distribution of p is almost Gaussian. It
+/// camera at r; sigma_rho is in 1/m. L_d is small if the distribution of p is almost Gaussian. L_d
 /// is infinite at rho = 0, and zero for Xyz.
 inline double LinearityIndex(const Ray<double>& ray, double sigma_rho, const double* position) {
   double dot = 0.0, length2 = 0.0;  // computed from rho (p - r), to avoid a division by rho^2

@@ -13,7 +13,7 @@ struct PoseAnd<Z, std::tuple<G...>> {
   using Type = Sensor<Z, Vec<3>, UnitQuaternion, G...>;
 };
 
-/// Returns the roles of the pose of a camera, followed by the roles of a landmark.
+/// Returns the two roles of the camera's pose, followed by the roles of a landmark.
 template <std::size_t N>
 constexpr std::array<Quantity, N + 2> PrependPose(const std::array<Quantity, N>& landmark) {
   std::array<Quantity, N + 2> roles{
@@ -25,15 +25,18 @@ constexpr std::array<Quantity, N + 2> PrependPose(const std::array<Quantity, N>&
 
 }  // namespace detail
 
-/// Base of a sensor that observes landmarks with one `Representation` from a camera. The roles are
-/// position and orientation of the camera, followed by the roles of the representation. The code of
-/// the model does not depend on the representation. The model has
+/// Base of a sensor that observes landmarks from a camera. All landmarks have the same
+/// `Representation`. The roles are the position and orientation of the camera, followed by the
+/// roles of the representation. The code of the model does not depend on the representation.
+///
+/// The model defines functions of the point h / rho in the camera frame, which is at infinity if
+/// rho = 0:
 ///
 ///   template <class T> bool PredictInCamera(const T* h, const T& rho, T* z) const;
 ///   template <class T> void SqrtNoiseInCamera(const T* h, const T& rho, T* L) const;
 ///
-/// for the point h / rho in the camera frame, which is at infinity if rho = 0. It also has
-/// Initialise, as in Sensor. The noise is not evaluated if Predict returns false.
+/// The model also defines Initialise, which Sensor describes. The noise is not evaluated if Predict
+/// returns false.
 template <class Model, class Z, class Representation>
 struct LandmarkSensor : detail::PoseAnd<Z, typename Representation::Spaces>::Type {
   static constexpr auto kRoles = detail::PrependPose(Representation::kRoles);

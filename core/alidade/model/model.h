@@ -13,9 +13,9 @@
 #include "alidade/model/geometry.h"
 #include "alidade/model/params.h"
 
-/// Base classes of models. A model is a struct that derives from Sensor or Motion. The functions of
-/// a model that are differentiated are templated on the scalar type. No function has side effects.
-/// A model needs only this header and C++17, and can be used without a plugin.
+/// Base classes of models. A model is a struct that derives from Sensor or Motion. Its functions
+/// have no side effects. Each function that is differentiated is a template on the scalar type. A
+/// model needs only this header and C++17, and can be used without a plugin.
 namespace alidade {
 
 /// Name and unit of a quantity: a role, a measurement or a control input.
@@ -27,8 +27,8 @@ struct Quantity {
   unsigned flags = 0;         ///< ALIDADE_ROLE_*
 };
 
-/// Row-major view of a Jacobian or covariance factor. Empty if the caller does not request the
-/// matrix.
+/// Row-major view of a Jacobian or covariance factor. The view is empty if the caller does not
+/// request the matrix.
 struct MatrixRef {
   double* data = nullptr;
   int stride = 0;
@@ -40,13 +40,13 @@ struct MatrixRef {
   explicit operator bool() const { return data != nullptr; }
 };
 
-/// Prior and dynamics of a role with the flag ALIDADE_ROLE_OWNED. A config may override them.
+/// Prior and dynamics of a role with the flag ALIDADE_ROLE_OWNED. A config may override both.
 /// `mean` has one number for each ambient element. `sigma` and `density` have one number for each
 /// tangent element.
 struct Owned {
   std::uint32_t dynamics = ALIDADE_STAYS;
   std::vector<double> mean, sigma;
-  std::vector<double> density;   ///< root of the density of the driving white noise, unit / sqrt(s)
+  std::vector<double> density;   ///< root of the spectral density of the driving noise
   double time_constant_s = 0.0;  ///< time constant of a Gauss-Markov process
 
   /// Returns the prior of a constant.
@@ -68,8 +68,9 @@ struct Owned {
   }
 };
 
-/// Kind of process noise. It determines the noise over an interval between two updates that is
-/// predicted in several steps. With both kinds, different intervals have independent noise.
+/// Kind of process noise. The kind matters if the interval between two updates is predicted in
+/// several steps. With both kinds, the noise of one interval is independent of the noise of other
+/// intervals.
 enum class NoiseKind {
   /// Each step has independent noise w. For an interval of two steps, Q = F_2 Q_1 F_2' + Q_2.
   kContinuous,
@@ -77,7 +78,7 @@ enum class NoiseKind {
   kDiscrete,
 };
 
-/// Base of a sensor z = h(roles) + n, n ~ N(0, L L'). The model must have
+/// Base of a sensor z = h(roles) + n, n ~ N(0, L L'). The model must define
 ///
 ///   static constexpr std::array kRoles{Quantity{...}, ...};      one for each role
 ///   static constexpr Quantity kMeasurement{...};
@@ -87,7 +88,7 @@ enum class NoiseKind {
 ///   template <class T> void SqrtNoise(const T* role..., [const T* z,] T* L) const;
 ///                                                                       L: row-major, initially 0
 ///
-/// and may also have
+/// and may also define
 ///
 ///   using Known = Vec<3>; static constexpr Quantity kKnown{...};    known numbers of each
 ///                                       measurement, which are not estimated, such as the
@@ -102,14 +103,14 @@ enum class NoiseKind {
 ///
 /// A role with the flag ALIDADE_ROLE_OWNED is a model parameter state of the sensor, such as a bias
 /// or a lever arm, unless the config binds the role to a block. Such a state is constant at the
-/// neutral element of its geometry, unless the model defines prior and dynamics by
+/// neutral element of its geometry, unless the model defines the prior and dynamics by
 ///
 ///   Owned OwnedRole(int role) const;
 ///
 /// Roles with the flag ALIDADE_ROLE_LANDMARK must be adjacent. They are bound to the landmark that
-/// a measurement names. If kInitialises is the first of these roles, y contains the values of all
-/// of them, one after the other. An optional member with a wrong signature is a compile error
-/// (model_members.h).
+/// the measurement identifies. If kInitialises is the first of these roles, y contains the values
+/// of all landmark roles, one after the other. An optional member with a wrong signature is a
+/// compile error (model_members.h).
 template <class MeasurementGeometry, class... RoleGeometries>
 struct Sensor {
   static_assert(((RoleGeometries::kGeometry != ALIDADE_PRODUCT) && ... && true),
@@ -123,7 +124,7 @@ struct Sensor {
 };
 
 /// Base of a motion model x' = f(x, u, w, dt), w ~ N(0, Lq Lq'). w has NoiseSize elements. The
-/// model must have
+/// model must define
 ///
 ///   static constexpr std::array kBlocks{Quantity{...}, ...};     one for each block
 ///   explicit Model(Params&);
@@ -131,7 +132,7 @@ struct Sensor {
 ///                                T* next...) const;
 ///   void SqrtQ([const double* block...,] double dt_s, MatrixRef Lq) const;       Lq: initially 0
 ///
-/// Step may return bool; false means out of domain. The model may also have
+/// Step may return bool; false means out of domain. The model may also define
 ///
 ///   using Input = Vec<2>; static constexpr Quantity kInput{...};        a control input u
 ///   void StepJacobian(const double* block..., const double* w, double dt_s, MatrixRef F,
@@ -141,16 +142,17 @@ struct Sensor {
 ///                                              step
 ///   NoiseKind noise_kind() const;              default: kContinuous; `alidade check` tests it
 ///   static constexpr int kStepOrder = N;       1 to 8: steps are additive in dt up to an error of
-///                                              order dt^N (Euler's method: 2). Default 0: additive
+///                                              order dt^N (Euler's method: 2). Default: 0, exact
 ///
 /// Lq of discrete noise is evaluated at the start of an interval and must not depend on dt_s.
 ///
 /// A block with the flag ALIDADE_ROLE_OWNED, such as a bias or an extrinsic parameter, is constant
 /// at the neutral element of its geometry, unless the config defines an initial value.
 ///
-/// A model with blocks of size kDynamic needs StepJacobian, `int Size(int block) const` and `int
-/// NoiseSize() const`. Its Step, StepJacobian and SqrtQ write directly to the buffers of the caller
-/// and must not throw. If Step returns false, it must not have changed the buffers.
+/// A model with blocks of size kDynamic needs StepJacobian and also the two functions
+/// `int Size(int block) const` and `int NoiseSize() const`. Its Step, StepJacobian and SqrtQ write
+/// directly to the buffers of the caller and must not throw. If Step returns false, it must not
+/// have changed the buffers.
 template <int NoiseSize, class... BlockGeometries>
 struct Motion {
   using Spaces = std::tuple<BlockGeometries...>;
@@ -180,7 +182,7 @@ using Blocks = SpacesOf<typename Model::Spaces>;
 template <int I, class Model>
 using SpaceAt = std::tuple_element_t<static_cast<std::size_t>(I), typename Model::Spaces>;
 
-/// Returns whether Initialise computes the role i.
+/// Returns true if Initialise computes the role i.
 template <class Model>
 constexpr bool IsInitialised(int i) {
   constexpr int first = Model::kInitialises;
@@ -199,7 +201,7 @@ void ForEach(const F& f, std::index_sequence<I...>) {
   (f(std::integral_constant<int, static_cast<int>(I)>{}), ...);
 }
 
-/// `const T*`, and MatrixRef, for every index of a pack.
+/// Aliases that map every index of a pack to the same type: `const T*`, or MatrixRef.
 template <class T, std::size_t>
 using Pointer = const T*;
 template <std::size_t>
@@ -221,8 +223,8 @@ decltype(auto) WithRoles(const F& f, const T* const* x, const double* known,
   }
 }
 
-/// `value` is true if Call can be called with (model, a `const T*` for each of Indices, [known,]
-/// arguments...).
+/// `value` is true if Call can be called with the arguments (model, one `const T*` for each index,
+/// [known,] arguments...).
 template <class T, class Call, class Model, class Indices, class... Arguments>
 struct AcceptsRolesOf;
 template <class T, class Call, class Model, std::size_t... I, class... Arguments>

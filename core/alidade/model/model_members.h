@@ -8,17 +8,17 @@
 #include "alidade/model/jet.h"
 #include "alidade/model/model.h"
 
-/// Checks of the members of a model, with readable compile errors. The checks reject a model
-/// without a required member. They also reject an optional member with a wrong signature, which
-/// would otherwise be ignored silently. Optional members of a final struct are not checked.
+/// Compile-time checks of the members of a model, with readable error messages. The checks reject a
+/// model without a required member. They also reject an optional member with a wrong signature,
+/// which would otherwise be ignored silently. Optional members of a final struct are not checked.
 namespace alidade {
 namespace detail {
 
 struct Nothing {};
 
-/// DeclaresNAME<Model>::value is true if the model has any member NAME. The check derives a struct
-/// from the model and from another struct with a member NAME. If the model has a member NAME too,
-/// NAME is ambiguous.
+/// DeclaresNAME<Model>::value is true if the model has any member called NAME. The check derives a
+/// struct from the model and from another struct that has a member NAME. If the model also has a
+/// member NAME, then NAME is ambiguous in the derived struct.
 #define ALIDADE_DECLARES(NAME)                                                         \
   struct With##NAME {                                                                  \
     int NAME;                                                                          \
@@ -47,7 +47,7 @@ struct PredictCall {
 template <class Model, class Indices, class T = double>
 struct HasPredict : AcceptsRolesOf<T, PredictCall, Model, Indices, T*> {};
 
-/// Scalar type of automatic differentiation.
+/// Dual number with which the checks instantiate the functions of a model.
 using AnyJet = Jet<double, 1>;
 
 template <class Model, class = void>
@@ -151,7 +151,7 @@ struct CanInitialise {
           : AcceptsRoles<InitialiseCall, Model, OtherRoles, const double*, double*>::value;
 };
 
-/// Returns whether each quantity has a name.
+/// Returns true if each quantity has a name.
 template <class Quantities>
 constexpr bool AreNamed(const Quantities& quantities) {
   for (const Quantity& quantity : quantities) {
@@ -160,8 +160,8 @@ constexpr bool AreNamed(const Quantities& quantities) {
   return true;
 }
 
-/// Rejects at compile time a sensor without the names that a problem or a plugin needs. StaticEkf
-/// does not need these names. Always returns true.
+/// Compile-time check: rejects a sensor without the names that a Problem or a plugin needs.
+/// StaticEkf does not need these names. Returns true.
 template <class Model>
 constexpr bool CheckSensorNames() {
   static_assert(HasRoles<Model>::value,
@@ -182,8 +182,8 @@ constexpr bool CheckMotionNames() {
   return true;
 }
 
-/// Rejects at compile time a sensor if a function is missing or has a wrong signature. Always
-/// returns true.
+/// Compile-time check: rejects a sensor if a function is missing or has a wrong signature. Returns
+/// true.
 template <class Model>
 constexpr bool CheckSensorMembers() {
   using Indices = typename Blocks<Model>::Indices;
@@ -227,8 +227,8 @@ constexpr bool StepOrderFits() {
   }
 }
 
-/// Rejects at compile time a motion model if a function is missing or has a wrong signature. Always
-/// returns true.
+/// Compile-time check: rejects a motion model if a function is missing or has a wrong signature.
+/// Returns true.
 template <class Model>
 constexpr bool CheckMotionMembers() {
   using Indices = typename Blocks<Model>::Indices;

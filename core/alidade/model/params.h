@@ -15,7 +15,7 @@
 
 namespace alidade {
 
-/// Bounds of a parameter. An open bound excludes the bound itself.
+/// Range of a parameter. The range does not contain an open bound.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -35,7 +35,7 @@ class Params {
   explicit Params(const AlidadeHost* host) : host_(host) {}
 
   /// Returns the value of `key`, or a substitute within `range` if the value is invalid. The key is
-  /// optional if `fallback` is given.
+  /// optional if `fallback` has a value.
   double Number(const char* key, const char* unit, const char* doc, Range range = {},
                 std::optional<double> fallback = std::nullopt) {
     double value = fallback.value_or(StandIn(range));
@@ -43,7 +43,7 @@ class Params {
          1);
     return value;
   }
-  /// Returns the value of `key`, or nullopt if it is the word `none`. The default is `none`.
+  /// Returns the value of `key`, or nullopt if the value is the word `none`. The default is `none`.
   std::optional<double> NumberOrNone(const char* key, const char* unit, const char* doc,
                                      Range range) {
     const double infinity = std::numeric_limits<double>::infinity();
@@ -124,11 +124,11 @@ class Params {
     std::array<double, N> result;
     result.fill(count >= 1 ? values[0] : StandIn(range));
     if (count == N) std::copy_n(values, N, result.begin());
-    if (count > 1 && count != N) Fail(key, "needs one number, or one for each axis");
+    if (count > 1 && count != N) Fail(key, "needs one number, or one number for each axis");
     return result;
   }
-  /// Reports an error of parameters, for example parameters that contradict each other. `text`
-  /// follows the key in the message.
+  /// Reports an error of the parameters, for example if two parameters contradict each other.
+  /// `text` follows the key in the message.
   void Fail(const char* key, const char* text) { host_->fail(host_->context, key, text); }
 
  private:

@@ -27,7 +27,7 @@ void Publish(std::unique_ptr<Holder<Model>> holder, std::uint32_t kind, AlidadeI
 template <class Model>
 void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* instance) {
   static_assert(CheckSensorNames<Model>());
-  constexpr auto roles = Model::kRoles;  // copied, so that plugins do not share the symbol
+  constexpr auto roles = Model::kRoles;  // local copy, so that plugins do not share the symbol
   holder->DescribeRoles(roles);
   holder->DescribeMeasurement();
   holder->DescribeKnown();
@@ -73,7 +73,7 @@ void PublishMotion(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
   Publish(std::move(holder), ALIDADE_KIND_MOTION, instance);
 }
 
-/// Implements `create` of an entry: runs f(params) and reports an exception to the host.
+/// Implements `create` of an entry. Runs f(params) and reports an exception to the host.
 template <class F>
 std::int32_t GuardedCreate(const AlidadeHost* host, const F& f) noexcept {
   Params params(host);
@@ -127,9 +127,10 @@ void EmplaceMotion(Params& params, AlidadeInstance* instance) {
 
 }  // namespace alidade
 
-/// Each of these macros defines one model of a plugin. The argument `make` of the _BY macros is a
-/// function `void (alidade::Params&, AlidadeInstance*)`. Use them if a parameter selects the struct
-/// of the model. The function reads the parameter and emplaces the struct.
+/// Each of these macros defines one model of a plugin. Use the _BY macros if a parameter selects
+/// the struct of the model. Their argument `make` is a function `void (alidade::Params&,
+/// AlidadeInstance*)` that reads this parameter and calls EmplaceSensor or EmplaceMotion for the
+/// selected struct.
 #define ALIDADE_SENSOR(Model, name, doc, citation) \
   ALIDADE_SENSOR_BY(alidade::EmplaceSensor<Model>, name, doc, citation)
 #define ALIDADE_MOTION(Model, name, doc, citation) \

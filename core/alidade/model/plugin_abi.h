@@ -1,33 +1,34 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #pragma once
 
-/* Plugin ABI: the interface between alidade and a C-ABI plugin, in plain C data. Authors of models
- * use model.h, which implements this interface for them. The header compiles as C99 and as C++17.
- * The text below is normative; docs/plugin_abi.md repeats it with the reasons.
+/* Plugin ABI: the interface between alidade and a C-ABI plugin, which consists of plain C data.
+ * Authors of models use model.h, which implements this interface for them. This header compiles as
+ * C99 and as C++17. The text below is normative; docs/plugin_abi.md explains the reasons.
  *
  * A plugin exports one function, `alidade_plugin`, which returns the table of the plugin. A plugin
  * also contains one build tag in the ELF section `.alidade`, which the host reads before it loads
  * the file. A plugin may list the names of its entries in the section `.alidade_names`. The host
  * can then find the names without loading the file.
  *
- * Structs. Every struct begins with its own size. A reader of a struct from the other side reads
- * only that many bytes and treats members beyond them as zero. Arrays of structs are traversed with
- * the stride that is stated next to them. Within a major version, structs that plugins create may
- * grow at their end and may use reserved members. Structs that hosts create (AlidadeHost,
- * AlidadeInstance, AlidadeObservation, AlidadePayload) may only use reserved members. Reserved
- * members are zero; a reader rejects a struct with a reserved member that is not zero. The upper
- * half of every word of flags are the bits of ALIDADE_MUST_UNDERSTAND. A reader rejects a struct if
- * an unknown bit of the upper half is set, and ignores unknown bits of the lower half. A host
- * ignores an entry of unknown kind, but not the other entries of the plugin.
+ * Structs. Every struct begins with its own size. The reader of a struct is the side that did not
+ * create it. A reader reads only the stated number of bytes, and treats all members beyond them as
+ * zero. The stride of an array of structs is stated next to the array. Within a major version,
+ * structs that plugins create may grow at their end and may use reserved members. Structs that
+ * hosts create (AlidadeHost, AlidadeInstance, AlidadeObservation, AlidadePayload) may only use
+ * reserved members. Reserved members are zero; a reader rejects a struct with a reserved member
+ * that is not zero. ALIDADE_MUST_UNDERSTAND is the upper half of every word of flags. A reader
+ * rejects a struct if an unknown bit of the upper half is set, and ignores unknown bits of the
+ * lower half. A host ignores an entry of unknown kind, but uses the other entries of the plugin.
  *
- * Texts are UTF-8 without control characters, of at most ALIDADE_MAX_TEXT bytes. Names are 1 to
- * ALIDADE_MAX_NAME printable ASCII characters without blanks. Texts of the table are valid as long
- * as the library is loaded, texts of a description as long as the instance exists, and error_text
- * until the next call in the same thread. A null text means "".
+ * Texts are UTF-8 without control characters and have at most ALIDADE_MAX_TEXT bytes. Names consist
+ * of 1 to ALIDADE_MAX_NAME printable ASCII characters without blanks. Texts of the table are valid
+ * while the library is loaded. Texts of a description are valid while the instance exists. The
+ * result of error_text is valid until the next call in the same thread. A null text means "".
  *
- * Numbers. Matrices are row-major with an explicit row stride, in doubles. Jacobians are in the
- * tangent space of each block. Angles are in rad, lengths in m, times in s, unless another unit is
- * stated. Quaternions and directions have unit length to 1e-9. Quaternions may have either sign.
+ * Numbers. Matrices are row-major arrays of doubles with an explicit row stride. Jacobians are in
+ * the tangent space of each block. Angles are in rad, lengths in m, times in s, unless another unit
+ * is stated. The length of a quaternion or direction differs from 1 by at most 1e-9. A quaternion
+ * may have either sign.
  *
  * Calls. The caller owns all buffers. Outputs overlap neither inputs nor each other. Pointers are
  * aligned to 8 bytes, payloads to 64 bytes. Outputs are uninitialised before a call. A call that
@@ -52,13 +53,13 @@ extern "C" {
 #define ALIDADE_MAGIC 0x4144494cu /* "LIDA" */
 #define ALIDADE_ENTRY_SYMBOL "alidade_plugin"
 #define ALIDADE_BUILD_TAG_SECTION ".alidade"
-/* Optional section that contains only the names of all entries, each followed by a zero byte. A
- * host need not load a plugin to look for a name that is not listed. */
+/* Optional section that contains only the names of all entries, each followed by a zero byte. If a
+ * name is not listed, a host that searches for this name need not load the plugin. */
 #define ALIDADE_NAMES_SECTION ".alidade_names"
 
 /* Upper half of every word of flags. */
 #define ALIDADE_MUST_UNDERSTAND 0xffff0000u
-/* True if `*p`, a struct from the other side, is large enough to contain `member`. */
+/* True if `*p`, a struct that the other side created, is large enough to contain `member`. */
 #define ALIDADE_HAS(p, type, member) \
   ((p)->struct_size >= offsetof(type, member) + sizeof((p)->member))
 
@@ -76,9 +77,9 @@ enum {
 /* Result of an evaluation. */
 enum {
   ALIDADE_OK = 0,
-  ALIDADE_OUT_OF_DOMAIN = 1, /* the arguments are outside the domain: behind the camera, Z <= 0 */
-  ALIDADE_INVALID = 2,       /* the measurement is unusable, such as beyond the sensor's limits */
-  ALIDADE_ERROR = 3          /* the plugin failed, for example by an exception; see error_text */
+  ALIDADE_OUT_OF_DOMAIN = 1, /* the arguments are outside the domain, such as a depth Z <= 0 */
+  ALIDADE_INVALID = 2,       /* the measurement is invalid, for example out of range */
+  ALIDADE_ERROR = 3          /* the plugin failed; error_text returns the reason */
 };
 
 /* Reserved function pointer; null in this version. */
@@ -132,12 +133,12 @@ typedef struct AlidadeBuildTag {
   char magic[8]; /* "ALIDADE" and a zero byte */
   uint32_t struct_size;
   uint16_t abi_major, abi_minor; /* version of the header that the plugin includes */
-  uint16_t needs_minor;          /* lowest minor version of a host for this plugin */
+  uint16_t needs_minor;          /* lowest minor version of a host that can use it */
   uint16_t reserved0;
   uint32_t kind, flags, isa;
   uint32_t cplusplus; /* __cplusplus */
   char compiler[64];  /* __VERSION__ */
-  char build[160];    /* C++ plugin: must equal the text of the host; else empty */
+  char build[160];    /* C++ plugin: must equal the text of the host; C ABI: "" */
   uint32_t reserved[7];
 } AlidadeBuildTag;
 
@@ -150,7 +151,7 @@ typedef struct AlidadeBuildTag {
  * ALIDADE_UNIT_QUATERNION  ambient 4, tangent 3      w x y z, Hamilton; x (+) d = x Exp(d),
  *                                                    Exp(d) = (cos |d|/2, sin(|d|/2) d / |d|)
  * ALIDADE_UNIT_VECTOR      ambient 3, tangent 2      x (+) d = cos |d| x + sin |d| / |d| B(x) d
- * ALIDADE_PRODUCT          sums of the parts         the parts one after the other, each with its
+ * ALIDADE_PRODUCT          sums of the parts         concatenation of the parts, each with its
  *                                                    own (+); only for measurements
  *
  * B(x) of a unit vector, with s = -1 if x2 < 0, else s = 1 (also for x2 = -0), a = -1 / (s + x2):
@@ -159,7 +160,7 @@ typedef struct AlidadeBuildTag {
  *   B(x)  =  [ s x0 x1 a       s + x1^2 a  ]
  *            [ -s x0           -x1         ]
  *
- * If y is the antipode of x, all ways from x to y are equally short, and y (-) x = (pi, 0).
+ * If y is the antipode of x, several shortest d exist, and y (-) x = (pi, 0).
  * docs/plugin_abi.md contains an example of each geometry. */
 enum {
   ALIDADE_VECTOR = 1,
@@ -171,12 +172,12 @@ enum {
 
 /* Bits of AlidadeSpace.flags. */
 enum {
-  ALIDADE_ROLE_OPTIONAL = 1 << 16, /* may have no block; its pointer is then null */
-  ALIDADE_ROLE_OWNED = 1 << 17,    /* the block belongs to the model: a bias, an extrinsic */
-  ALIDADE_ROLE_LANDMARK = 1 << 18, /* bound to the landmark that a measurement names */
-  ALIDADE_ROLE_SHARED = 1 << 19,   /* with LANDMARK: all landmarks that are first seen at the
-                                      same timestamp share one block */
-  ALIDADE_ROLE_CLONE = 1 << 20     /* the value at the earlier timestamp (span_s) */
+  ALIDADE_ROLE_OPTIONAL = 1 << 16, /* may have no block; the pointer is then null */
+  ALIDADE_ROLE_OWNED = 1 << 17,    /* parameter of the model, such as a bias */
+  ALIDADE_ROLE_LANDMARK = 1 << 18, /* bound to the landmark of the measurement */
+  ALIDADE_ROLE_SHARED = 1 << 19,   /* with LANDMARK: all landmarks that are first observed
+                                      at the same timestamp share one block */
+  ALIDADE_ROLE_CLONE = 1 << 20     /* value of the block at the time of z minus span_s */
 };
 
 enum { ALIDADE_STAYS = 0, ALIDADE_RANDOM_WALK = 1, ALIDADE_GAUSS_MARKOV = 2 };
@@ -184,9 +185,9 @@ enum { ALIDADE_STAYS = 0, ALIDADE_RANDOM_WALK = 1, ALIDADE_GAUSS_MARKOV = 2 };
 /* Prior and dynamics of a role with ALIDADE_ROLE_OWNED. A config may override each of them. */
 typedef struct AlidadeOwned {
   uint32_t struct_size, dynamics;
-  const double* mean;         /* ambient; null: the neutral element */
+  const double* mean;         /* ambient values; null: the neutral element */
   const double* sqrt_prior;   /* L with P = L L', tangent x tangent; null: known exactly */
-  const double* sqrt_density; /* L of the driving white noise, per sqrt(s); null: zero */
+  const double* sqrt_density; /* root L of the spectral density of the noise; null: zero */
   double time_constant_s;     /* time constant of ALIDADE_GAUSS_MARKOV */
   void* reserved[4];
 } AlidadeOwned;
@@ -197,12 +198,12 @@ typedef struct AlidadeSpace {
   int32_t ambient, tangent;
   uint32_t flags, reserved0;
   const char* name;
-  const char* unit; /* unit of every element; "" for a quantity without unit */
+  const char* unit; /* unit of every element; "" if there is no unit */
   const char*
       elements; /* names of the ambient elements, comma separated; "" for a single element */
   const char* doc;
   const AlidadeOwned* owned;        /* null: constant at the neutral element, known exactly */
-  const struct AlidadeSpace* parts; /* parts of a product: 1 to ALIDADE_MAX_ROLES, not products */
+  const struct AlidadeSpace* parts; /* 1 to ALIDADE_MAX_ROLES parts; a part is not a product */
   uint32_t part_count, part_stride;
   void* reserved[1];
 } AlidadeSpace;
@@ -236,7 +237,7 @@ typedef struct AlidadeParam {
   uint32_t flags;
   double low, high;
   const double*
-      fallback; /* `count` defaults, if ALIDADE_PARAM_HAS_DEFAULT; an index for a choice */
+      fallback; /* `count` defaults if ALIDADE_PARAM_HAS_DEFAULT is set; for a choice: an index */
   const char* const* choices;
   int32_t choice_count, reserved0;
   const char* fallback_text; /* default of a text or file */
@@ -271,8 +272,8 @@ enum { ALIDADE_KIND_SENSOR = 1, ALIDADE_KIND_MOTION = 2 };
 enum {
   ALIDADE_ANALYTIC_JACOBIAN = 1, /* analytic Jacobians; else automatic differentiation */
   ALIDADE_STATIONARY = 2,        /* motion: x' = x and no noise; step need not be called */
-  /* motion: four bits from this bit on contain N. `step` without noise is additive in dt up to an
-   * error of order dt^N. N = 0: `step` is exactly additive. */
+  /* motion: this bit and the three bits above contain N. `step` without noise is additive in dt up
+   * to an error of order dt^N. N = 0: `step` is exactly additive. */
   ALIDADE_STEP_ORDER_SHIFT = 4,
   ALIDADE_CAN_INITIALISE = 1 << 16,
   ALIDADE_HAS_VALIDITY = 1 << 17,
@@ -294,7 +295,7 @@ typedef struct AlidadeDescription {
   const AlidadeSpace* inputs;   /* motion: control inputs */
   uint32_t input_count, input_stride;
   int32_t noise_count;          /* motion: n_w */
-  int32_t initialise_role;      /* the role that `initialise` computes, if it exists */
+  int32_t initialise_role;      /* index of the role that `initialise` computes */
   const uint8_t* step_sparsity; /* motion: n x n, 1 if F may be non-zero; null: dense */
   int32_t prior_count;          /* number of prior values that `initialise` needs */
   int32_t reserved0;
@@ -308,13 +309,13 @@ enum {
   ALIDADE_PAYLOAD_POINTS_F32 = 4
 };
 
-/* Data of a measurement besides its numbers, such as an image. */
+/* Data of a measurement in addition to its numbers, such as an image. */
 typedef struct AlidadePayload {
   uint32_t struct_size, kind;
   const void* data;
   uint64_t bytes;
   int64_t row_bytes;               /* image: distance between rows */
-  int32_t width, height, channels; /* points: their number, 1, numbers for each point */
+  int32_t width, height, channels; /* points: number of points, 1, numbers per point */
   int32_t reserved0;
   void* reserved[4];
 } AlidadePayload;
@@ -322,10 +323,10 @@ typedef struct AlidadePayload {
 /* One measurement. The struct is valid only during a call. */
 typedef struct AlidadeObservation {
   uint32_t struct_size, flags;
-  const double* z;     /* ambient; null if only a prediction is requested */
-  const double* known; /* described by description.known; null if that is null */
-  double offset_s;     /* timestamp of z minus that of the roles; not 0 only in a scan */
-  double span_s;       /* timestamp of z minus that of roles with ALIDADE_ROLE_CLONE */
+  const double* z;     /* ambient values; null if only a prediction is requested */
+  const double* known; /* space: description.known; null if description.known is null */
+  double offset_s;     /* timestamp of z minus timestamp of the roles; 0 except in a scan */
+  double span_s;       /* timestamp of z minus timestamp of roles with ALIDADE_ROLE_CLONE */
   const AlidadePayload* payloads;
   uint32_t payload_count, payload_stride;
   void* reserved[4];
@@ -347,7 +348,7 @@ typedef struct AlidadeSensor {
    * roles, z and the prior. The prior contains the numbers that z does not determine, and is null
    * if z determines all of y. If the role has ALIDADE_ROLE_LANDMARK, y contains the values of this
    * role and of the landmark roles that follow, one after the other. Also computes the Jacobians of
-   * y: jx[i] by the other roles, jz by z, jp by the prior. Each of them may be null. */
+   * y: jx[i] = dy/d role i, jz = dy/dz, jp = dy/d prior. Each Jacobian may be null. */
   int32_t (*initialise)(const void* self, const AlidadeObservation* seen,
                         const double* const* roles, const double* prior, double* y,
                         double* const* jx, const int32_t* jx_strides, double* jz, int32_t jz_stride,
@@ -373,13 +374,13 @@ typedef struct AlidadeMotion {
   AlidadeReservedCall reserved[6];
 } AlidadeMotion;
 
-/* One model. The host sets all members to zero and sets struct_size. `create` sets the others. */
+/* One model. The host zeroes the struct and sets struct_size. `create` sets the other members. */
 typedef struct AlidadeInstance {
   uint32_t struct_size, kind;
   void* self;
   void (*destroy)(void* self);
   const char* (*error_text)(const void* self); /* text of the last ALIDADE_ERROR in this thread */
-  const AlidadeDescription* description;       /* valid as long as self */
+  const AlidadeDescription* description;       /* valid while self exists */
   const AlidadeSensor* sensor; /* `kind` determines whether sensor or motion is set */
   const AlidadeMotion* motion;
   void* reserved[8];

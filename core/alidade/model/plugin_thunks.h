@@ -10,8 +10,8 @@
 #include "alidade/model/autodiff_inverse.h"
 #include "alidade/model/plugin_abi.h"
 
-/// Functions that implement plugin_abi.h by calls of a model. They are noexcept and convert an
-/// exception to ALIDADE_ERROR.
+/// Functions that implement the functions of plugin_abi.h with a model. They are noexcept and
+/// convert an exception to ALIDADE_ERROR.
 namespace alidade {
 namespace detail {
 
@@ -54,7 +54,7 @@ struct AbiPrior {
   AlidadeOwned c{};
 };
 
-/// Model with its description. AlidadeInstance::self points to it.
+/// Model with its description. AlidadeInstance::self points to the Holder.
 template <class Model>
 struct Holder {
   explicit Holder(Params& p) : Holder(Model(p)) {}
@@ -100,7 +100,7 @@ struct Holder {
     description.output = &space;
   }
 
-  /// Describes prior and dynamics of the roles that are model parameter states of the sensor.
+  /// Describes the prior and dynamics of each role that is a model parameter state of the sensor.
   void DescribeOwned() {
     if constexpr (HasOwnedRole<Model>::value) {
       for (int i = 0; i < Blocks<Model>::kCount; ++i) {
@@ -140,7 +140,8 @@ struct Holder {
   std::unique_ptr<AbiPrior> priors[Blocks<Model>::kCount];
 };
 
-/// Text of the last ALIDADE_ERROR in this thread. Hidden, so that each plugin has its own text.
+/// Text of the last ALIDADE_ERROR in this thread. The symbol is hidden, so that each plugin has its
+/// own text.
 struct __attribute__((visibility("hidden"))) LastError {
   static char* Text() {
     static thread_local char text[256] = "";
@@ -168,15 +169,16 @@ std::int32_t CallGuarded(const void* self, const F& f) noexcept {
 #endif
 }
 
-/// Returns the known numbers. If the model uses none, returns null without reading `observation`.
+/// Returns the known numbers of a measurement. If the model does not use known numbers, returns
+/// null without reading `observation`.
 template <class Model>
 const double* KnownOf(const AlidadeObservation* observation) {
   return kHasKnown<Model> ? observation->known : nullptr;
 }
 
-/// ABI functions of a sensor. Hidden, like MotionCalls. If kCalls were exported, two plugins with a
-/// struct of the same name would both use the kCalls of the first plugin (STB_GNU_UNIQUE). The
-/// flags of dlopen cannot prevent this.
+/// ABI functions of a sensor. The symbols of SensorCalls and MotionCalls are hidden. If kCalls were
+/// exported, two plugins with a struct of the same name would both use the kCalls of the first
+/// plugin (STB_GNU_UNIQUE). The flags of dlopen cannot prevent this.
 template <class Model>
 struct __attribute__((visibility("hidden"))) SensorCalls {
   static constexpr bool kInitialises = Model::kInitialises >= 0;

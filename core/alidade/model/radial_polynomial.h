@@ -19,15 +19,15 @@ double ValueOf(const T& x) {
 }
 
 /// Radial polynomial r s(r^2) with s(q) = 1 + k1 q + k2 q^2 + k3 q^3 + k4 q^4. The polynomial
-/// increases on its domain 0 <= r^2 <= q_max. The members are functions of q = r^2, because these
-/// are smooth at r = 0.
+/// increases on its domain 0 <= r^2 <= q_max. The argument of the functions is q = r^2, because
+/// they are then smooth at r = 0.
 struct RadialPolynomial {
   std::array<double, 4> k{};
   double q_max = 0.0;
 
   RadialPolynomial() = default;
-  /// Sets q_max to `limit`, or to the first maximum of r s(r^2) if it is below `limit`. The maximum
-  /// is found to 1 %.
+  /// Sets q_max to `limit`, or to the first maximum of r s(r^2) if this maximum is below `limit`.
+  /// The relative error of the maximum is at most 1 %.
   RadialPolynomial(const std::array<double, 4>& coefficients, double limit) : k(coefficients) {
     for (double q = 1e-6; q < limit && Slope(q) > 0.0; q *= 1.01) q_max = q;
     if (q_max > 0.98 * limit) q_max = limit;

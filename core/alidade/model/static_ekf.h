@@ -12,8 +12,8 @@
 #include "alidade/model/autodiff.h"
 
 /// Filter whose models are combined at compile time, for embedded systems. It needs C++17 and
-/// Eigen, but no plugins, configs, memory allocation or exceptions. Benchmarks also compare the
-/// filters of a Problem with it.
+/// Eigen, but no plugins, configs, memory allocation or exceptions. Benchmarks also compare this
+/// filter with the filters of a Problem.
 namespace alidade {
 
 /// Outcome of a measurement in StaticEkf::Update.
@@ -81,10 +81,10 @@ class StaticEkf {
   /// Returns P, n x n, in the order of the blocks.
   Covariance covariance() const { return p_.template selfadjointView<Eigen::Lower>(); }
 
-  /// Predicts the state after dt_s seconds. `u` are the control inputs of the models that have a
-  /// control input, in the order of the models. Each is a `const double*` to ambient values.
-  /// Returns kOutOfDomain if a model is not defined at the state, and kError if x' or P' is not
-  /// finite. In both cases x and P are unchanged.
+  /// Predicts the state after dt_s seconds. `u` contains the control inputs of the models that have
+  /// a control input, in the order of the models. Each input is a `const double*` to ambient
+  /// values. Returns kOutOfDomain if a model is not defined at the state, and kError if x' or P' is
+  /// not finite. In both cases x and P are unchanged.
   template <class... Inputs>
   ALIDADE_FLATTEN Status Predict(double dt_s, Inputs... u) {
     static_assert(sizeof...(Inputs) == InputsBefore(sizeof...(Motions)),
@@ -125,8 +125,8 @@ class StaticEkf {
     for (std::size_t i = 0; i < m; ++i) count += has_input[i] ? 1 : 0;
     return count;
   }
-  /// View of a matrix that a model has written. (Eigen requires column-major order for a single
-  /// column.)
+  /// View of a matrix that a model has written. The order is row-major, except for a single column,
+  /// for which Eigen requires column-major order.
   template <int R, int C>
   using RowMajorMap = Eigen::Map<
       const Eigen::Matrix<double, R, C, C == 1 && R != 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
@@ -171,7 +171,7 @@ class StaticEkf {
     in_interval_ = true;
     return Status::kOk;
   }
-  /// Applies a change of x and P. If a result is not finite, restores both and returns false.
+  /// Applies a change of x and P. If a result is not finite, restores x and P and returns false.
   template <class Change>
   bool ApplyIfFinite(const Change& change);
   template <std::size_t M, class Noise>
@@ -217,7 +217,7 @@ class StaticEkf {
     return Status::kOk;
   }
 
-  /// Returns P(i, j), of which only the lower triangle is stored.
+  /// Returns a reference to P(i, j). Only the lower triangle of P is stored.
   double& P(int i, int j) { return i >= j ? p_(i, j) : p_(j, i); }
   /// Propagates P for the rows a = [O, O + N): P_aa <- F P_aa F' + Q, P_ai <- F P_ai for all other
   /// rows i.
@@ -249,7 +249,7 @@ class StaticEkf {
   double x_[kAmbient] = {};
   Covariance p_ = Covariance::Zero();
   std::tuple<DiscreteNoise<Motions>...> noise_;  ///< noise of the current interval
-  bool in_interval_ = false;                     ///< whether the last change of P was a prediction
+  bool in_interval_ = false;                     ///< true if the last change of P was a prediction
 };
 
 // Unrolls a loop of constant length at any level of optimisation. Disabled if sanitizers are

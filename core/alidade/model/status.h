@@ -9,7 +9,7 @@ namespace alidade {
 enum class [[nodiscard]] Status : int{
     kOk = ALIDADE_OK,
     kOutOfDomain = ALIDADE_OUT_OF_DOMAIN,  ///< the model is not defined at the arguments
-    kInvalid = ALIDADE_INVALID,            ///< the measurement cannot be used at any state
+    kInvalid = ALIDADE_INVALID,            ///< the measurement is invalid at every state
     kError = ALIDADE_ERROR,                ///< the plugin failed
 };
 

@@ -12,7 +12,7 @@
 #include "alidade/base/error.h"
 #include "alidade/model/plugin_abi.h"
 
-/// Helpers that call plugins and read the structs of plugin_abi.h by the rules of that file.
+/// Helpers that call plugins and read the structs of plugin_abi.h according to its rules.
 namespace alidade::internal {
 
 [[noreturn]] inline void Refuse(const std::filesystem::path& plugin, const std::string& reason) {
@@ -26,8 +26,8 @@ inline std::string Text(const char* text) { return text == nullptr ? "" : text; 
 /// breaks none.
 std::string TextDefect(const char* text);
 
-/// Returns a text of a plugin for a message: UTF-8 of at most ALIDADE_MAX_TEXT bytes. Control
-/// characters and invalid bytes are replaced by `?`.
+/// Returns at most the first ALIDADE_MAX_TEXT bytes of a plugin's text, for a message. Replaces
+/// control characters and invalid bytes by `?`.
 std::string PrintableText(const char* text);
 
 /// Returns true if `name` has 1 to ALIDADE_MAX_NAME bytes of printable ASCII without blanks.
@@ -43,9 +43,9 @@ bool AllZero(const T (&reserved)[N]) {
 /// such as `0x20000`; "" if no such bit is set.
 std::string UnknownBits(std::uint32_t flags, std::uint32_t known);
 
-/// Returns a copy of a struct of plugin_abi.h, up to the size that the struct states. Omits a
-/// pointer that lies only partly within this size. Members beyond the size are zero. `limit` bounds
-/// the stated size, in bytes.
+/// Copies a struct of plugin_abi.h up to the size that the struct states, but at most `limit`
+/// bytes. Members of the copy beyond this size are zero. A pointer that lies only partly within the
+/// size is also zero.
 template <class T>
 T ReadPrefix(const T* source, std::size_t limit = sizeof(T)) {
   T copy{};
@@ -54,22 +54,22 @@ T ReadPrefix(const T* source, std::size_t limit = sizeof(T)) {
   return copy;
 }
 
-/// Returns the i-th struct of a table with the given stride.
+/// Returns the i-th struct of an array with the given stride in bytes.
 template <class T>
 T ReadEntry(const T* first, std::uint32_t stride, std::size_t i) {
   const char* entry = reinterpret_cast<const char*>(first) + i * stride;
   return ReadPrefix(reinterpret_cast<const T*>(entry), stride);
 }
 
-/// Returns true if the structs of a table with this stride are aligned and not too large.
+/// Returns true if the structs of an array with this stride are aligned and not too large.
 template <class T>
 bool IsValidStride(std::uint32_t stride) {
   constexpr std::uint32_t kMax = 1 << 16;
   return stride >= 2 * sizeof(std::uint32_t) && stride <= kMax && stride % alignof(T) == 0;
 }
 
-/// Returns a measurement for a plugin: the values `z`, and the `known` numbers that accompany them.
-/// `z` is null if only a prediction is requested.
+/// Returns a measurement for a plugin. It consists of the values `z` and of the `known` numbers of
+/// the measurement. `z` is null if only a prediction is requested.
 inline AlidadeObservation MakeObservation(const double* z, const double* known) {
   AlidadeObservation observation{};
   observation.struct_size = sizeof(observation);

@@ -10,8 +10,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns L of A = L L', n x n row-major, computed column by column. If a pivot is zero within
-/// rounding errors, sets the column to zero and `is_singular` to true.
+/// Returns L of A = L L', n x n row-major. Computes L column by column. If a pivot is zero within
+/// rounding errors, sets its column to zero and `is_singular` to true.
 std::vector<double> RootOf(const std::vector<double>& a, std::size_t n, bool& is_singular) {
   const double rounding = 64.0 * static_cast<double>(n) * std::numeric_limits<double>::epsilon();
   std::vector<double> l(n * n, 0.0);
@@ -36,10 +36,10 @@ void ExpectDiscrete(const Node& covariance, const ModelInstance& model) {
   if ((model.capabilities() & ALIDADE_DISCRETE_NOISE) == 0) {
     covariance.Fail(
         "model '" + model.name() + "' has continuous noise, whose covariance depends on dt",
-        "the noise keys of the model, or `noise.kind: discrete` if the model has it");
+        "the noise keys of the model, or `noise.kind: discrete` if the model offers it");
   }
   if (model.c().description->noise_count == 0) {
-    covariance.Fail("model '" + model.name() + "' has no noise inputs", "no such key");
+    covariance.Fail("model '" + model.name() + "' has no noise inputs; remove this key");
   }
 }
 
@@ -60,7 +60,7 @@ std::vector<double> ReadNoiseRoot(const Node& covariance, const ModelInstance& m
   std::vector<double> root =
       RootOf(ReadCovariance(covariance, n), static_cast<std::size_t>(n), is_singular);
   if (is_sensor && is_singular) {
-    covariance.Fail("is singular: the measurement would have no noise in one direction",
+    covariance.Fail("is singular, so the measurement would have no noise in one direction",
                     "a positive definite covariance");
   }
   return root;

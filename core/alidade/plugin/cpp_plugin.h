@@ -6,14 +6,14 @@
 
 #include "alidade/model/build_tag.h"
 
-/// Table of a C++ plugin, which is built against alidade::core. The header of an interface defines
-/// the macro that exports its implementations.
+/// Table of a C++ plugin. Such a plugin is built against alidade::core. The header of each
+/// interface defines the macro that exports implementations of the interface.
 namespace alidade {
 
-/// ABI number of C++ plugins, which share classes with the library. A plugin is loaded only if its
-/// number equals that of the library. Increase the number with each change of the layout or meaning
-/// of an installed class or function. The classes of a debug standard library have a different
-/// layout, hence the second definition.
+/// ABI number of C++ plugins. A plugin is loaded only if its number equals the number of the
+/// library, because the two share classes. Increase the number with each change of the layout or
+/// meaning of an installed class or function. The second definition is necessary because the
+/// classes of a debug standard library have a different layout.
 #if defined(_GLIBCXX_DEBUG)
 #define ALIDADE_CPP_ABI "4 with _GLIBCXX_DEBUG"
 #else
@@ -23,11 +23,11 @@ namespace alidade {
 /// Implementation of an interface by a plugin. The loader does not know the type of `factory`. The
 /// code that requests an implementation of this kind casts the pointer to the correct type.
 struct CppEntry {
-  const char* kind;  ///< name of the interface, such as `source`; messages use it too
+  const char* kind;  ///< name of the interface, such as `source`; appears in messages
   const char* name;
   const char* doc;
   const char* citation;
-  /// Keys that are not read through Params, one per line: `key  meaning`.
+  /// Keys that are not read through Params. Each line has the form `key  meaning`.
   const char* keys;
   const void* factory;  ///< pointer to the type that the header of the interface defines
 };
@@ -45,7 +45,7 @@ template <std::size_t N>
 struct CppEntries {
   CppEntry entries[N];
 };
-/// Returns the entries of the factories, which the function EntryOf of their type creates.
+/// Returns the entries of the factories. EntryOf(factory) must return the entry of one factory.
 template <class Factory, std::size_t N>
 constexpr CppEntries<N> EntriesOf(const Factory (&factories)[N]) {
   CppEntries<N> result{};
@@ -55,7 +55,8 @@ constexpr CppEntries<N> EntriesOf(const Factory (&factories)[N]) {
 
 }  // namespace alidade
 
-/// Exports the factories `...` of the type `Factory`. Each factory is an initialiser in braces.
+/// Exports factories of the type `Factory`. Each further argument is the initialiser of one
+/// factory, in braces.
 #define ALIDADE_CPP_PLUGIN(Factory, ...)                                           \
   static constexpr Factory alidade_factories[] = {__VA_ARGS__};                    \
   static constexpr auto alidade_offers = alidade::EntriesOf(alidade_factories);    \

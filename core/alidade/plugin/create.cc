@@ -33,8 +33,8 @@ std::unique_lock<std::recursive_mutex> LockCreation() {
   return lock;
 }
 
-/// Instance that the plugin's `create` function fills. The destructor destroys the model unless it
-/// was released.
+/// Instance that the plugin's `create` function fills. The destructor destroys the model unless
+/// Release() was called.
 class NewInstance {
  public:
   explicit NewInstance(const PluginEntry& entry) : name_(entry.name), plugin_(entry.plugin) {
@@ -48,7 +48,7 @@ class NewInstance {
   NewInstance(const NewInstance&) = delete;
   NewInstance& operator=(const NewInstance&) = delete;
 
-  /// Returns the code of `create`, or ALIDADE_ERROR if it threw.
+  /// Calls `create`. Returns the code of `create`, or ALIDADE_ERROR if `create` threw an exception.
   std::int32_t Create(const AlidadeEntry& entry, const AlidadeHost& host) {
     std::int32_t code = ALIDADE_ERROR;
     exception_text_ = internal::CatchExceptionText([&] { code = entry.create(&host, &c_); });
@@ -73,7 +73,7 @@ std::string QuotedName(const PluginEntry& entry) {
   throw Error(ExitCode::kPlugin,
               ErrorLine(node.place(), node.path(),
                         QuotedName(entry) + " of plugin " + entry.plugin.string() +
-                            " failed while being created: " + reason));
+                            " could not be created: " + reason));
 }
 
 std::string SpaceLine(const std::string& kind, const Space& space) {
@@ -111,7 +111,7 @@ std::vector<std::string> Capabilities(const ModelInstance& model) {
   return lines;
 }
 
-/// Parses the `keys` of a factory: `key  meaning` on each line.
+/// Parses the `keys` of a factory. Each line has the form `key  meaning`.
 std::vector<ParamInfo> ListedKeys(const std::string& keys) {
   std::vector<ParamInfo> result;
   std::istringstream lines(keys);
@@ -140,7 +140,7 @@ std::shared_ptr<const ModelInstance> CreateModel(const PluginEntry& entry, const
   }
   reader.Check();
   if (!instance.exception_text().empty())
-    FailCreation(entry, node, "it threw: " + instance.exception_text());
+    FailCreation(entry, node, "it threw an exception: " + instance.exception_text());
   if (code != ALIDADE_OK) {
     FailCreation(entry, node,
                  reader.failure().empty() ? "it did not report a reason" : reader.failure());

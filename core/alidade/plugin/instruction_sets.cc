@@ -18,7 +18,7 @@ enum Register { kEax, kEbx, kEcx, kEdx };
 /// Registers that the operating system must save for an instruction set, as bits of XCR0.
 enum : std::uint32_t { kNothing = 0, kYmm = 0x6, kZmm = 0xe6 };
 
-/// Instruction set, with its position in the output of cpuid: leaf, subleaf, register and bit.
+/// Instruction set. The members `leaf` to `bit` are its position in the output of cpuid.
 struct InstructionSet {
   std::uint32_t isa;
   const char* name;
@@ -72,8 +72,8 @@ std::uint32_t SavedRegisters() {
   return low;
 }
 
-/// Reads the instruction sets from the processor. Reads each leaf only once, because cpuid is slow
-/// in a virtual machine.
+/// Reads the instruction sets of the processor. Calls cpuid only once for each leaf, because cpuid
+/// is slow in a virtual machine.
 std::uint32_t ReadInstructionSets() {
   const std::uint32_t saved = SavedRegisters();
   std::uint32_t isa = 0, registers[4] = {};

@@ -7,11 +7,12 @@
 /// Instruction sets of this processor, as the bits ALIDADE_ISA_* of plugin_abi.h.
 namespace alidade::internal {
 
-/// Returns the instruction sets that the processor has and whose registers the operating system
-/// saves.
+/// Returns the instruction sets that the processor supports and whose registers the operating
+/// system saves.
 std::uint32_t InstructionSetsOfProcessor();
 
-/// Returns the names of instruction sets, such as `AVX2, FMA`. Names an unknown bit by its number.
+/// Returns the names of instruction sets, such as `AVX2, FMA`. The text for an unknown bit contains
+/// the number of the bit.
 std::string InstructionSetNames(std::uint32_t isa);
 
 }  // namespace alidade::internal

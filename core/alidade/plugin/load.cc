@@ -23,12 +23,12 @@ void CheckBuild(const AlidadeBuildTag& build_tag, const std::filesystem::path& f
   const std::uint32_t missing = build_tag.isa & ~InstructionSetsOfProcessor();
   if (missing != 0) {
     Refuse(file, "needs an instruction set that this processor lacks (" +
-                     InstructionSetNames(missing) + "); build it without -march");
+                     InstructionSetNames(missing) + "); build the plugin without -march");
   }
   if (build_tag.kind == ALIDADE_PLUGIN_CPP && std::strcmp(build_tag.build, ALIDADE_CPP_ABI) != 0) {
     Refuse(file, "is a C++ plugin for ABI number '" + std::string(build_tag.build) +
                      "', but this program has '" ALIDADE_CPP_ABI
-                     "'; rebuild it with this version of alidade");
+                     "'; rebuild the plugin with this version of alidade");
   }
 }
 

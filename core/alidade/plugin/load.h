@@ -9,7 +9,7 @@
 
 namespace alidade::internal {
 
-/// Plugin that stays loaded for the rest of the process.
+/// Loaded plugin. It remains loaded until the process ends.
 struct LoadedPlugin {
   std::filesystem::path file;       ///< path without symbolic links
   const AlidadeTable* table;        ///< table of a C-ABI plugin, else null
@@ -17,14 +17,14 @@ struct LoadedPlugin {
 };
 
 /// Checks whether `file` is trusted and its build tag is compatible, loads the plugin and checks
-/// its table. `canonical` is `file` with its symbolic links resolved. Errors:
-/// kPlugin, kNotTrusted.
+/// its table. `canonical` is `file` with its symbolic links resolved. Errors: kPlugin, kNotTrusted.
 LoadedPlugin LoadPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical);
 
 /// Loads the only plugin in `folder`, or in `lib/alidade/NAME` next to this library if `folder` is
 /// "". Returns the factory of the plugin's first entry, which must be of the kind `kind`. Errors:
-/// those of LoadPlugin; kPlugin if the folder contains more than one plugin, a plugin of another
-/// kind, or no plugin. In the last case the message consists of `missing` and the searched folder.
+/// the errors of LoadPlugin; kPlugin if the folder contains more than one plugin, a plugin of
+/// another kind, or no plugin. If there is no plugin, the message contains `missing` and the
+/// searched folder.
 const void* FactoryOnDemand(const std::string& kind, const std::string& name,
                             const std::filesystem::path& folder, const std::string& missing);
 

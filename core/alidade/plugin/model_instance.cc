@@ -26,7 +26,7 @@ constexpr std::uint32_t kKnownCapabilities = ALIDADE_CAN_INITIALISE | ALIDADE_HA
                                              ALIDADE_RESIDUAL_ONLY | ALIDADE_NEEDS_PAYLOAD |
                                              ALIDADE_DISCRETE_NOISE;
 constexpr const char* kUnsupported = ", which this version does not support";
-constexpr const char* kReserved = "uses reserved members";
+constexpr const char* kReserved = "uses reserved members, which must be zero";
 
 AlidadeSpace PartOf(const AlidadeSpace& space, std::size_t i) {
   return internal::ReadEntry(space.parts, space.part_stride, i);
@@ -39,7 +39,7 @@ Geometry GeometryOf(const AlidadeSpace& space) {
   return Geometry::Product(std::move(parts));
 }
 
-/// Returns true if this version knows the geometry, and the sizes fit it.
+/// Returns true if this version knows the geometry and the sizes are correct for it.
 bool IsKnownGeometry(const AlidadeSpace& space) {
   if (FindGeometry(space.geometry) == nullptr) return false;
   const Geometry geometry = GeometryOf(space);
@@ -96,7 +96,8 @@ std::string SpaceDefect(const AlidadeSpace& space) {
   }
   const std::string elements = Text(space.elements);
   if (!elements.empty() && std::ssize(internal::SplitNames(elements)) != space.ambient) {
-    return "names its elements '" + elements + "', but has " + std::to_string(space.ambient);
+    return "names its elements '" + elements + "', but has " + std::to_string(space.ambient) +
+           (space.ambient == 1 ? " element" : " elements");
   }
   if ((space.flags & ALIDADE_ROLE_SHARED) != 0 && (space.flags & ALIDADE_ROLE_LANDMARK) == 0) {
     return "is shared, but is not a landmark role";
@@ -105,7 +106,7 @@ std::string SpaceDefect(const AlidadeSpace& space) {
     return std::string("is the value at an earlier timestamp") + kUnsupported;
   }
   if (space.owned != nullptr && (space.flags & ALIDADE_ROLE_OWNED) == 0) {
-    return "has a prior and dynamics, but is not a state of its model";
+    return "has a prior and dynamics, but is not a model parameter state";
   }
   return {};
 }
@@ -137,7 +138,7 @@ void internal::DestroyInstance(const AlidadeInstance& instance, const std::strin
   const std::string exception_text = CatchExceptionText([&] { instance.destroy(instance.self); });
   if (exception_text.empty()) return;
   Log(LogLevel::kWarning,
-      "Destroy of model '" + name + "' of plugin " + plugin + " threw: " + exception_text);
+      "function destroy of model '" + name + "' of plugin " + plugin + " threw: " + exception_text);
 }
 
 ModelInstance::ModelInstance(const AlidadeInstance& instance, std::string name, std::string plugin)
@@ -171,10 +172,11 @@ void ModelInstance::ReadCalls() {
     instance_.motion = &motion_;
     if (!internal::AllZero(motion_.reserved)) Refuse(kReserved);
     if (motion_.step == nullptr || motion_.sqrt_q == nullptr) {
-      Refuse("lacks a function that every motion model must have: step, sqrt_q");
+      Refuse("lacks a function that every motion model must have (step or sqrt_q)");
     }
   } else {
-    Refuse("is of kind " + std::to_string(instance_.kind) + " or lacks the functions of its kind");
+    Refuse("is of kind " + std::to_string(instance_.kind) +
+           ", which this version does not know, or lacks the functions of this kind");
   }
 }
 
@@ -192,12 +194,12 @@ void ModelInstance::ReadDescription() {
     if (description_.known != nullptr) {
       known_ = ReadSpace(ReadPrefix(description_.known), "the known quantity");
       if (!known_.geometry.is_vector()) {
-        Refuse(": the known quantity is not a vector");
+        Refuse("is invalid: the known quantity is not a vector");
       }
     }
   } else if (has_input()) {
     space_ = ReadSpace(ReadPrefix(description_.inputs), "the control input");
-    if (space_.geometry.is_product()) Refuse(": the control input is a product");
+    if (space_.geometry.is_product()) Refuse("is invalid: the control input is a product");
   }
   const int y = description_.initialise_role;
   if (is_sensor && (capabilities_ & ALIDADE_CAN_INITIALISE) != 0 &&
@@ -205,10 +207,10 @@ void ModelInstance::ReadDescription() {
     Refuse("claims to initialise a role, but does not define the role or the function");
   }
   if (is_sensor && (description_.prior_count < 0 || description_.prior_count > kMaxSize)) {
-    Refuse("states a prior of size " + std::to_string(description_.prior_count));
+    Refuse("states an invalid prior size: " + std::to_string(description_.prior_count));
   }
   if (!is_sensor && (description_.noise_count < 0 || description_.noise_count > kMaxSize)) {
-    Refuse("states a noise of size " + std::to_string(description_.noise_count));
+    Refuse("states an invalid noise size: " + std::to_string(description_.noise_count));
   }
 }
 
@@ -226,7 +228,7 @@ void ModelInstance::CheckSupported() const {
   }
   if (is_sensor) {
     if (sensor_.eval == nullptr || sensor_.sqrt_noise == nullptr) {
-      Refuse("lacks a function that every sensor must have: eval, sqrt_noise");
+      Refuse("lacks a function that every sensor must have (eval or sqrt_noise)");
     }
   } else if (description_.input_count > 1) {
     Refuse("has " + std::to_string(description_.input_count) + " control inputs" + kUnsupported);
@@ -240,10 +242,11 @@ void ModelInstance::CheckSupported() const {
 void ModelInstance::ReadRoles() {
   const int count = static_cast<int>(std::min<std::uint32_t>(description_.role_count, 1 << 16));
   if (count < 1 || count > kMaxRoles || description_.roles == nullptr) {
-    Refuse("has " + std::to_string(count) + " roles; 1 to 64 are allowed");
+    Refuse("has " + std::to_string(count) + " roles; expected 1 to 64 roles");
   }
   if (!internal::IsValidStride<AlidadeSpace>(description_.role_stride)) {
-    Refuse("states a role stride of " + std::to_string(description_.role_stride) + " bytes");
+    Refuse("states an invalid role stride of " + std::to_string(description_.role_stride) +
+           " bytes");
   }
   for (int i = 0; i < count; ++i) {
     const auto role = internal::ReadEntry(description_.roles, description_.role_stride, i);
@@ -252,7 +255,8 @@ void ModelInstance::ReadRoles() {
       ReadOwned(ReadPrefix(role.owned), spaces_.back(), static_cast<std::size_t>(i));
     }
     if (role.geometry == ALIDADE_PRODUCT) {
-      Refuse(": role '" + spaces_.back().name + "' is a product; expected a role for each part");
+      Refuse("is invalid: role '" + spaces_.back().name +
+             "' is a product; expected a role for each part");
     }
     const auto same = [&](const Space& other) { return other.name == spaces_.back().name; };
     if (std::count_if(spaces_.begin(), spaces_.end(), same) > 1) {
@@ -262,9 +266,11 @@ void ModelInstance::ReadRoles() {
 }
 
 void ModelInstance::ReadOwned(const AlidadeOwned& owned, const Space& role, std::size_t index) {
-  const std::string subject = ": the prior or dynamics of role '" + role.name + "' ";
-  if (instance_.kind != ALIDADE_KIND_SENSOR) Refuse(subject + "belong to a motion model");
-  if (role.landmark()) Refuse(subject + "belong to a landmark");
+  const std::string subject = "is invalid: the prior or dynamics of role '" + role.name + "' ";
+  if (instance_.kind != ALIDADE_KIND_SENSOR) {
+    Refuse(subject + "belong to a motion model; only a sensor can have a prior");
+  }
+  if (role.landmark()) Refuse(subject + "belong to a landmark; a landmark cannot have a prior");
   if (!internal::AllZero(owned.reserved)) Refuse(kReserved);
   if (owned.dynamics > ALIDADE_GAUSS_MARKOV) {
     Refuse(subject + "are of kind " + std::to_string(owned.dynamics));
@@ -290,7 +296,7 @@ void ModelInstance::SetNoise(std::vector<double> root) {
 
 Space ModelInstance::ReadSpace(const AlidadeSpace& space, const std::string& subject) const {
   const std::string defect = SpaceDefect(space);
-  if (!defect.empty()) Refuse(": " + subject + ' ' + defect);
+  if (!defect.empty()) Refuse("is invalid: " + subject + ' ' + defect);
   return ToSpace(space);
 }
 
@@ -299,9 +305,9 @@ std::string ModelInstance::error_text() const {
   std::string text;
   const std::string failure = internal::CatchExceptionText(
       [&] { text = PrintableText(instance_.error_text(instance_.self)); });
-  return failure.empty()
-             ? text
-             : "error_text of model '" + name_ + "' of plugin " + plugin_ + " threw: " + failure;
+  return failure.empty() ? text
+                         : "function error_text of model '" + name_ + "' of plugin " + plugin_ +
+                               " threw: " + failure;
 }
 
 }  // namespace alidade

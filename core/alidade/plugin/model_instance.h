@@ -18,8 +18,8 @@ void DestroyInstance(const AlidadeInstance& instance, const std::string& name,
                      const std::string& plugin) noexcept;
 }  // namespace internal
 
-/// Owner of one instance that a plugin created. It provides the description of the instance as C++
-/// values.
+/// Owner of one model instance that a plugin created. Provides the description of the instance as
+/// C++ values.
 class ModelInstance {
  public:
   /// Takes ownership of `instance`. Messages contain the `name` of the model and the file `plugin`.
@@ -32,21 +32,21 @@ class ModelInstance {
   const AlidadeInstance& c() const { return instance_; }
   const std::string& name() const { return name_; }
   const std::string& plugin() const { return plugin_; }
-  /// Roles of a sensor, or blocks of a motion model.
+  /// Returns the roles of a sensor, or the blocks of a motion model.
   const std::vector<Space>& spaces() const { return spaces_; }
-  /// Returns the prior and dynamics of each role whose prior the model defines. The key is the
-  /// index of the role.
+  /// Returns the prior and dynamics of each role for which the model defines a prior. The key is
+  /// the index of the role.
   const std::map<std::size_t, OwnedRole>& owned() const { return owned_; }
   /// Returns the space of a sensor's measurement, or of a motion model's control input. The name of
   /// the space is empty if the motion model has no control input.
   const Space& space() const { return space_; }
-  /// Returns the space of the known numbers that accompany each measurement. The name of the space
-  /// is empty if a measurement has no known numbers.
+  /// Returns the space of the known numbers of each measurement. The name of the space is empty if
+  /// measurements have no known numbers.
   const Space& known() const { return known_; }
   bool has_input() const { return description_.input_count > 0; }
   unsigned capabilities() const { return capabilities_; }
-  /// Returns the order in dt of the error by which two successive steps of a motion model differ
-  /// from one step over both. Returns 0 if the step is exactly additive in dt.
+  /// Returns the order in dt of the difference between two successive steps of a motion model and
+  /// one step over the total time. Returns 0 if there is no difference.
   int step_order() const {
     return static_cast<int>(capabilities_ >> ALIDADE_STEP_ORDER_SHIFT & 15u);
   }
@@ -68,7 +68,7 @@ class ModelInstance {
   Space ReadSpace(const AlidadeSpace& space, const std::string& subject) const;
   [[noreturn]] void Refuse(const std::string& reason) const;
 
-  AlidadeInstance instance_;  ///< pointers of this struct refer to the copies below
+  AlidadeInstance instance_;  ///< its pointers refer to the members below
   AlidadeDescription description_{};
   AlidadeSensor sensor_{};
   AlidadeMotion motion_{};

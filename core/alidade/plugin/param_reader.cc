@@ -66,7 +66,8 @@ bool IsNoise(const AlidadeParam& param) {
          (key.starts_with("sigma_") || key.starts_with("noise."));
 }
 
-/// Returns the default of the parameter. If it has no default, returns values within its range.
+/// Returns placeholder values: the default of the parameter or, without a default, values within
+/// the range.
 std::vector<double> StandIn(const AlidadeParam& param) {
   if (HasFallback(param) && param.count > 0) return Fallback(param);
   const bool has_lower_bound = param.low > -kInfinity, has_upper_bound = param.high < kInfinity;
@@ -110,8 +111,8 @@ ParamInfo Describe(const AlidadeParam& param) {
   return info;
 }
 
-/// Returns true if the parameter has no default or a valid one: one of the names of a choice, or
-/// numbers within the range.
+/// Returns true unless the default of the parameter is invalid. The valid defaults are an index
+/// into the choices, or numbers within the range. A parameter without a default is also valid.
 bool IsValidFallback(const AlidadeParam& param) {
   if (!HasFallback(param) || param.count < 0) return true;
   if (IsText(param)) return TextDefect(param.fallback_text).empty();
@@ -166,13 +167,14 @@ std::string ParamDefect(const AlidadeParam& param) {
 }
 
 /// Returns a copy of a requested parameter. Throws if the parameter breaks the rules of
-/// plugin_abi.h, or does not fit the requested function or its capacity.
+/// plugin_abi.h. Also throws if a text is requested by `read`, a number is requested by
+/// `read_text`, or the buffer is too small.
 AlidadeParam CheckParam(const AlidadeParam* source, bool reads_text, bool has_capacity) {
   if (source == nullptr) throw Error(ExitCode::kPlugin, "requests a null parameter");
   const AlidadeParam param = ReadPrefix(source);
   std::string defect = ParamDefect(param);
   if (defect.empty() && (reads_text != IsText(param) || !has_capacity))
-    defect = "the function of the request or its capacity is wrong";
+    defect = "the request uses the wrong function, or its buffer is too small";
   if (!defect.empty()) {
     throw Error(ExitCode::kPlugin, "requests parameter '" +
                                        (IsValidName(param.key) ? std::string(param.key) : "") +
@@ -245,15 +247,16 @@ std::vector<double> ReadValues(const AlidadeParam& param, const Node& node) {
   if (param.kind == ALIDADE_PARAM_NUMBER) {
     static_cast<void>(node.Numbers(param.count));
   } else if (param.count > 0 && std::ssize(items) != param.count) {
-    node.Fail(std::to_string(items.size()) + " values", std::to_string(param.count));
+    node.Fail("has " + std::to_string(items.size()) + (items.size() == 1 ? " value" : " values"),
+              std::to_string(param.count));
   }
   std::vector<double> values;
   for (const Node& item : items) values.push_back(ReadValue(param, item));
   return values;
 }
 
-/// Finds the node of a dotted key below `map`. If the node does not exist, sets `map` to the last
-/// map on its path that exists, and `key` to the missing part.
+/// Finds the node of a dotted key below `map`. Sets `map` to the last existing map on the path of
+/// the key, and `key` to the remaining part of the key.
 std::optional<Node> FindBelow(Node& map, std::string& key) {
   for (std::size_t dot; (dot = key.find('.')) != std::string::npos; key.erase(0, dot + 1)) {
     const std::optional<Node> child = map.Find(key.substr(0, dot));
@@ -332,7 +335,7 @@ std::int32_t ParamReader::ReadText(void* context, const AlidadeParam* param, cha
 
 void ParamReader::Fail(void* context, const char* key, const char* text) noexcept try {
   auto* reader = static_cast<ParamReader*>(context);
-  // The plugin caught a bad_alloc and reported its text.
+  // This text means that the plugin caught a bad_alloc.
   if (Text(text) == std::bad_alloc().what()) throw std::bad_alloc();
   if (Text(key).empty()) {
     reader->failure_ = Text(text).empty() ? "it did not report a reason" : PrintableText(text);
@@ -354,8 +357,8 @@ void ParamReader::Fail(void* context, const char* key, const char* text) noexcep
   static_cast<ParamReader*>(context)->exception_ = std::current_exception();
 }
 
-/// Returns the parameter that `check` returns. Reports a broken rule as an error of the plugin, at
-/// the place of the config entry.
+/// Returns the parameter that `check` returns. If `check` throws an Error, adds the place of the
+/// config entry and the name of the model to the error.
 AlidadeParam ParamReader::Expect(const std::function<AlidadeParam()>& check) {
   try {
     const AlidadeParam param = check();
@@ -371,7 +374,7 @@ AlidadeParam ParamReader::Expect(const std::function<AlidadeParam()>& check) {
   }
 }
 
-/// Returns the map in which `key` belongs: the entry or the root.
+/// Returns the map that contains or should contain `key`: the entry or the root.
 Node ParamReader::BaseOf(const std::string& key) const {
   const std::string first = key.substr(0, key.find('.'));
   if (first == key || (first != "camera" && first != "landmarks")) return entry_;
@@ -395,7 +398,7 @@ std::vector<double> ParamReader::Values(const AlidadeParam& param) const {
   Node map = BaseOf(key);
   const std::optional<Node> node = FindBelow(map, key);
   if (has_covariance_ && IsNoise(param)) {
-    if (node) node->Fail("the entry also defines the noise by `covariance`", "one of the two");
+    if (node) node->Fail("the entry also defines the noise by `covariance`", "one of the two keys");
     return StandIn(param);
   }
   if (!node) return Absent(param, map, key);
@@ -413,7 +416,7 @@ std::string ParamReader::TextOf(const AlidadeParam& param) const {
   if (!node) FailMissing(param, map, key);
   const std::string text = node->Text();
   const std::string defect = TextDefect(text.c_str());
-  if (!defect.empty()) node->Fail("a text that " + defect);
+  if (!defect.empty()) node->Fail("the text " + defect);
   return text;
 }
 
@@ -428,20 +431,21 @@ std::optional<Node> ParamReader::InCalibration(const std::string& key) const {
   return node;
 }
 
-/// Fails if `values`, read from the config at `node`, differ from the calibration of the data.
+/// Fails if `values`, which were read from `node` of the config, differ from the calibration of the
+/// data.
 void ParamReader::ExpectCalibrated(const AlidadeParam& param, const Node& node,
                                    const std::vector<double>& values) const {
   const std::optional<Node> data = InCalibration(param.key);
   if (!data) return;
   const auto is_same = [](double a, double b) {
-    constexpr double kTolerance = 1e-6;  // relative; one of the two texts may have fewer digits
+    constexpr double kTolerance = 1e-6;  // relative tolerance for rounded texts
     return std::abs(a - b) <= kTolerance * std::max(std::abs(a), std::abs(b));
   };
   const std::vector<double> calibrated = ReadValues(param, *data);
   if (std::ranges::equal(values, calibrated, is_same)) return;
   node.Fail(ValuesText(param, values) + " differs from the calibration of the data, " +
                 ValuesText(param, calibrated) + " in " + data->place().file,
-            "the same value, no such key (the data determine it), or 'source.calibration: ignore'");
+            "the same value; correct or remove this key, or set 'source.calibration: ignore'");
 }
 
 std::vector<double> ParamReader::Absent(const AlidadeParam& param, const Node& map,
@@ -459,8 +463,8 @@ void ParamReader::FailMissing(const AlidadeParam& param, const Node& map,
   try {
     static_cast<void>(map.At(first));
   } catch (const Error& e) {
-    // The message of the config also suggests a similar key, or a key with another unit. Retain
-    // this suggestion.
+    // The message of the config may suggest a similar key, or a key with another unit. This
+    // suggestion is retained.
     constexpr std::string_view kPhrase = ": missing key";
     std::string text = e.what();
     const std::size_t position = text.find(kPhrase);
@@ -471,7 +475,7 @@ void ParamReader::FailMissing(const AlidadeParam& param, const Node& map,
     }
     throw Error(ExitCode::kBadConfig, text);
   }
-  throw ContractViolation("an existing key was reported as missing: " + key_in_map);
+  throw ContractViolation("the existing key '" + key_in_map + "' was reported as missing");
 }
 
 ParamRecorder::ParamRecorder() : host_(MakeHost(this)), trials_(1) {
@@ -517,7 +521,8 @@ std::int32_t ParamRecorder::ReadText(void* context, const AlidadeParam* source, 
 void ParamRecorder::Record(const AlidadeParam& param, int value) {
   std::vector<Request>& requests = trials_.back().requests;
   const auto is_same = [&](const Request& request) { return request.info.key == param.key; };
-  if (requests.size() >= ALIDADE_MAX_PARAMS) return;  // reported when the model is created
+  // An excess of requests is reported when the model is created.
+  if (requests.size() >= ALIDADE_MAX_PARAMS) return;
   if (std::none_of(requests.begin(), requests.end(), is_same))
     requests.push_back({Describe(param), value});
 }

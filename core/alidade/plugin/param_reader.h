@@ -18,35 +18,36 @@ namespace alidade::internal {
 /// `context`.
 AlidadeHost MakeHost(void* context);
 
-/// Reader of a model's parameters. It searches these maps for a parameter, in this order:
+/// Reader of a model's parameters. It searches the following maps for a parameter, in this order:
 ///
 ///   1. the config entry of the model; a dotted key addresses nested maps
 ///   2. the root of the config, for keys that begin with `camera.` or `landmarks.`, which
 ///      the sensors and the source share
-///   3. the calibration of the data, `calibration` at the root (WithCalibration); a key without a
-///      dot is read there only if the parameter has no default
+///   3. the calibration of the data, which is the map `calibration` at the root
+///      (WithCalibration); it provides a key without a dot only if the parameter has no default
 ///
-/// If both the config and the calibration contain a value, the two must agree to a relative 1e-6.
-/// The reader collects all errors, so one run reports all of them. A request that breaks the rules
-/// of plugin_abi.h is an error kPlugin.
+/// If both the config and the calibration contain a value, the two values must agree within a
+/// relative tolerance of 1e-6. The reader collects all errors, so that one run reports all of them.
+/// A request that breaks the rules of plugin_abi.h is an error kPlugin.
 class ParamReader {
  public:
-  /// `owner` names the model in messages, such as `model 'scale_2d'`. `representation` replaces the
-  /// value of `landmarks.representation`, if it is one of the choices. `has_covariance` is true if
-  /// the entry contains a covariance instead of the model's noise. The model's parameters `sigma_*`
-  /// and `noise.*` then have stand-in values, and the entry must not contain them.
+  /// `owner` is the name of the model in messages, such as `model 'scale_2d'`. If `representation`
+  /// is one of the choices of `landmarks.representation`, it replaces the value of this key.
+  /// `has_covariance` is true if the entry contains a covariance instead of the model's noise. The
+  /// model's parameters `sigma_*` and `noise.*` then have placeholder values, and the entry must
+  /// not contain these keys.
   ParamReader(const Node& entry, std::string owner, std::string representation = {},
               bool has_covariance = false);
   ParamReader(const ParamReader&) = delete;
   ParamReader& operator=(const ParamReader&) = delete;
 
   const AlidadeHost& host() const { return host_; }
-  /// Returns the reason why the model cannot be created, if the reason does not concern a single
-  /// key; otherwise "".
+  /// Returns the reason why the model cannot be created if the plugin reported a reason that does
+  /// not concern a single key; otherwise "".
   const std::string& failure() const { return failure_; }
-  /// Throws one Error kBadConfig that contains all errors, sorted by position (the order of the
-  /// reads depends on the compiler). If a call failed for another reason, such as a lack of memory,
-  /// throws that exception instead. Returns if there was no error.
+  /// Throws one Error that contains all collected errors. They are sorted by position, because the
+  /// order of the reads depends on the compiler. If a call failed for another reason, such as a
+  /// lack of memory, throws the exception of that call instead.
   void Check() const;
 
  private:
@@ -75,11 +76,11 @@ class ParamReader {
   std::unordered_set<std::string> keys_;  ///< all requested keys
   std::vector<std::string> errors_;
   std::string failure_;
-  /// Exception of a call, stored because it must not reach the plugin.
+  /// Exception that a call caught. It is stored because it must not propagate into the plugin.
   std::exception_ptr exception_;
 };
 
-/// Recorder of the parameters that a model requests while it is created with stand-in values.
+/// Recorder of the parameters that a model requests while it is created with placeholder values.
 class ParamRecorder {
  public:
   ParamRecorder();
@@ -87,8 +88,8 @@ class ParamRecorder {
   ParamRecorder& operator=(const ParamRecorder&) = delete;
 
   const AlidadeHost& host() const { return host_; }
-  /// Runs `create` once with the default, else the first value, of every choice. Then runs it once
-  /// for each other value of each choice.
+  /// Runs `create` once with every choice at its default or, without a default, at its first value.
+  /// Then runs `create` once for each other value of each choice.
   template <class Create>
   void Run(const Create& create) {
     trials_.assign(1, Trial{});
@@ -102,17 +103,17 @@ class ParamRecorder {
       }
     }
   }
-  /// Returns all requested parameters: the required ones, those with a default, and those that
-  /// depend on a choice.
+  /// Returns all requested parameters. Required parameters are first, then parameters with a
+  /// default, then parameters that depend on a choice.
   std::vector<ParamInfo> Result() const;
 
  private:
   struct Request {
     ParamInfo info;
-    int value = 0;  ///< index that was returned, if the parameter is a choice
+    int value = 0;  ///< for a choice: index that Read() returned
   };
   struct Trial {
-    /// Key of the choice that differs from the first trial; "" in the first trial.
+    /// Key of the choice whose value differs from the first trial; "" for the first trial.
     std::string choice;
     int value = 0;
     std::vector<Request> requests;

@@ -8,10 +8,10 @@
 /// Folders of plugins.
 namespace alidade::internal {
 
-/// Returns the folders that the environment variable ALIDADE_PLUGIN_PATH lists, in the same order.
+/// Returns the folders that the environment variable ALIDADE_PLUGIN_PATH lists, in their order.
 std::vector<std::filesystem::path> PluginFoldersOfEnvironment();
 
-/// Returns the plugin folder of the user; nullopt if the user has no home folder.
+/// Returns the plugin folder of the user. Returns nullopt if the user has no home folder.
 std::optional<std::filesystem::path> PluginFolderOfUser();
 
 /// Returns the folder of the plugins of this build: `lib/alidade` next to this library, in the

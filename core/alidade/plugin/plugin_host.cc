@@ -25,8 +25,8 @@ using internal::Refuse;
 using internal::Text;
 using internal::WithArticle;
 
-/// Origin of places that the config or the command line names.
-constexpr const char* kGiven = "given";
+/// Origin of places that the config or the command line specifies.
+constexpr const char* kGiven = "config or command line";
 
 const char* ToKind(std::uint32_t kind) {
   return kind == ALIDADE_KIND_SENSOR ? kSensorKind : kMotionKind;
@@ -94,7 +94,8 @@ void PluginHost::LoadPlace(const fs::path& place, const std::string& origin, boo
   }
   std::string result = "does not exist";
   if (exists) {
-    result = std::to_string(entries_.size() - entries) + " found";
+    const std::size_t found = entries_.size() - entries;
+    result = std::to_string(found) + (found == 1 ? " entry found" : " entries found");
     if (refusals_.size() > refusals) {
       result += ", " + std::to_string(refusals_.size() - refusals) + " refused";
     }
@@ -102,7 +103,8 @@ void PluginHost::LoadPlace(const fs::path& place, const std::string& origin, boo
   searched_.push_back(place.string() + " (" + origin + "): " + result);
 }
 
-/// If `loads_all` is true, also loads plugins that offer none of the requested names.
+/// Loads the plugins in `folder`. If `loads_all` is false, skips plugins that offer none of the
+/// requested names.
 void PluginHost::LoadFolder(const fs::path& folder, bool is_required, bool loads_all) {
   std::set<fs::path> files;
   std::error_code error;
@@ -188,7 +190,7 @@ void PluginHost::FailMissing(const std::string& kind, const std::string& name,
                             "its name in the config, or the plugin in `plugins:`"));
     }
     if (entry.kind == kind) names.push_back(entry.name);
-    if (entry.name == name) problem += "; there is " + WithArticle(entry.kind) + " of that name";
+    if (entry.name == name) problem += "; there is " + WithArticle(entry.kind) + " with this name";
   }
   ExitCode code = ExitCode::kPlugin;
   for (const Refusal& refusal : refusals_) {

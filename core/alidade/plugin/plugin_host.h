@@ -18,13 +18,14 @@ struct ParamInfo {
   std::string key, unit, doc;
   std::string type;                  ///< number, integer, flag, choice, or `number[3]`
   std::string range;                 ///< `> 0`, `[1, 3]`, or "" if every value is allowed
-  std::string fallback;              ///< the default as text, "" if the key is required
+  std::string fallback;              ///< the default as text; "" if the key is required
   std::vector<std::string> choices;  ///< names of the values, if the type is `choice`
-  /// `noise_model = constant` if the model reads the parameter only with that choice; else "".
+  /// Condition on which the model reads the parameter, such as `noise_model = constant`; "" if the
+  /// model always reads it.
   std::string condition;
 };
 
-/// Kinds of models. The headers of the interfaces define the kinds of C++ plugins.
+/// Kinds of models. The kinds of C++ plugins are defined in the headers of their interfaces.
 inline constexpr const char* kSensorKind = "sensor";
 inline constexpr const char* kMotionKind = "motion model";
 
@@ -41,53 +42,54 @@ struct PluginEntry {
   bool is_model() const { return factory == nullptr; }
 };
 
-/// Refused file of a searched folder, with the reason for the refusal.
+/// File or folder that the host refused, with the reason.
 struct Refusal {
   std::filesystem::path file;
   std::string reason;
   ExitCode code;
 };
 
-/// Reaction to a configured file or folder that is missing or refused: an error, or an entry of
-/// PluginHost::searched() and refusals().
+/// Reaction to a configured file or folder that is missing or refused. kThrow throws an error.
+/// kList adds an entry to PluginHost::searched() and PluginHost::refusals().
 enum class OnRefusal { kThrow, kList };
 
-/// Host of plugins: finds plugins and loads them. It loads a file only if CheckTrusted accepts the
-/// file and the build tag of the file is compatible with this program. The host reads the build tag
-/// without loading the file. Plugins are never unloaded. Const members are thread-safe.
+/// Host of plugins: finds and loads plugins. It loads a file only if CheckTrusted accepts the file
+/// and the build tag of the file is compatible with this program. The host reads the build tag
+/// before it loads the file. Plugins are never unloaded. Const members are thread-safe.
 class PluginHost {
  public:
-  /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`),
-  /// ALIDADE_PLUGIN_PATH, the user data folder, the folder next to this library. `on_refusal`
-  /// applies to `files_and_folders`; refusals in other places are always listed. Errors: kPlugin,
-  /// kNotTrusted.
+  /// Searches these places in this order: `files_and_folders` (`plugins` of the config, then
+  /// `--plugin-path`), ALIDADE_PLUGIN_PATH, the user data folder, the folder next to this library.
+  /// `on_refusal` applies to `files_and_folders`; refusals in the other places are always listed.
+  /// Errors: kPlugin, kNotTrusted.
   ///
   /// If `requested_names` is set, it must contain every name that will be requested. To save time,
-  /// the host then does not load plugins outside `files_and_folders` that list none of these names.
-  /// If Find does not find a name, its error message requires all plugins: loading them is not
-  /// thread-safe.
+  /// the host then skips each plugin outside `files_and_folders` whose list of names contains none
+  /// of these names. If Find fails, it loads all plugins to compose the error message. Such a call
+  /// is not thread-safe.
   explicit PluginHost(const std::vector<std::filesystem::path>& files_and_folders = {},
                       OnRefusal on_refusal = OnRefusal::kThrow,
                       const std::optional<std::set<std::string>>& requested_names = {});
 
-  /// Creates the model with that name by CreateModel. Errors: those of Find and of CreateModel.
+  /// Creates the model `name` by CreateModel. Errors: the errors of Find and CreateModel.
   SharedSensor CreateSensor(const std::string& name, const Node& entry,
                             const std::string& representation = {}) const;
   SharedMotion CreateMotion(const std::string& name, const Node& entry) const;
-  /// Returns the only entry with that kind and name. `node` is the node of the config that requests
-  /// the entry. Errors: kPlugin, with the searched places, if no plugin or more than one plugin
-  /// offers such an entry.
+  /// Returns the only entry with this kind and name. `node` is the node of the config that requests
+  /// the entry. Errors: kPlugin if no plugin or more than one plugin offers such an entry;
+  /// kNotTrusted if no plugin offers such an entry and a file was refused because it is not
+  /// trusted.
   const PluginEntry& Find(const std::string& kind, const std::string& name, const Node& node) const;
 
   /// Returns false if plugins may have been skipped because of `requested_names`.
   bool has_all_plugins() const { return !requested_names_; }
-  /// Returns a host that has loaded all plugins. Error messages list the available entries of this
-  /// host.
+  /// Returns a host that has loaded all plugins. Error messages use this host to list all available
+  /// entries.
   PluginHost WithAllPlugins() const;
 
   const std::vector<PluginEntry>& entries() const { return entries_; }
-  /// Returns every searched place, in the order of the search. Each text includes the number of
-  /// entries that were found there.
+  /// Returns a text for every searched place, in the order of the search. Each text contains the
+  /// place and the number of entries that were found there.
   const std::vector<std::string>& searched() const { return searched_; }
   const std::vector<Refusal>& refusals() const { return refusals_; }
 

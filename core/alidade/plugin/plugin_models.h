@@ -28,7 +28,7 @@ class PluginSensor final : public SensorModel {
   std::shared_ptr<const ModelInstance> instance_;
   const AlidadeSensor* calls_;
   const void* self_;
-  /// Copied for each call, which is faster than zeroing a new one.
+  /// Initial value that ToAbi() copies for each call. Copying is faster than zeroing.
   AlidadeObservation empty_observation_;
 };
 

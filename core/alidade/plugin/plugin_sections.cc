@@ -22,7 +22,7 @@ constexpr Elf64_Half kMachine = EM_AARCH64;
 #else
 constexpr Elf64_Half kMachine = EM_X86_64;
 #endif
-constexpr std::uint64_t kMaxBytes = 1 << 20;  // limit of one read
+constexpr std::uint64_t kMaxBytes = 1 << 20;  // maximum size of one read
 
 /// Reads `count` values of T at `offset`. Returns an empty vector if the file is shorter.
 template <class T>
@@ -34,8 +34,8 @@ std::vector<T> ReadAt(std::istream& file, std::uint64_t offset, std::uint64_t co
   return values;
 }
 
-/// Reads a section of an ELF file for this kind of processor, without loading it as a library.
-/// Returns an empty vector if the file or section does not exist.
+/// Reads a section of an ELF file for this kind of processor, without loading the file as a
+/// library. Returns an empty vector if the file or section does not exist.
 std::vector<char> ReadSection(const fs::path& path, const std::string& name) {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return {};  // reading a pipe would block
@@ -71,23 +71,23 @@ AlidadeBuildTag ReadBuildTag(const fs::path& path) {
     Refuse(
         path,
         "has no alidade build tag: it is not an alidade plugin, is for another kind of processor, "
-        "is damaged, was built without ALIDADE_PLUGIN, or has lost its section headers");
+        "is damaged, was built without the macro ALIDADE_PLUGIN, or has no section headers");
   }
   AlidadeBuildTag tag{};
   std::memcpy(&tag, bytes.data(), std::min(bytes.size(), sizeof(tag)));
   constexpr std::size_t kVersioned = offsetof(AlidadeBuildTag, kind);
   if (bytes.size() < kVersioned || std::memcmp(tag.magic, "ALIDADE", sizeof(tag.magic)) != 0) {
-    Refuse(path, "malformed build tag");
+    Refuse(path, "has a malformed build tag");
   }
   if (tag.abi_major != ALIDADE_ABI_MAJOR) {
-    Refuse(path, "built for plugin ABI " + Version(tag.abi_major, tag.abi_minor) +
+    Refuse(path, "was built for plugin ABI " + Version(tag.abi_major, tag.abi_minor) +
                      ", but this program has " + Version(ALIDADE_ABI_MAJOR, ALIDADE_ABI_MINOR) +
                      "; rebuild the plugin against this version");
   }
   constexpr std::size_t kNeeded = offsetof(AlidadeBuildTag, reserved);
   if (tag.struct_size < kNeeded || bytes.size() < kNeeded ||
       (tag.kind != ALIDADE_PLUGIN_C_ABI && tag.kind != ALIDADE_PLUGIN_CPP)) {
-    Refuse(path, "malformed build tag");
+    Refuse(path, "has a malformed build tag");
   }
   if (tag.needs_minor > ALIDADE_ABI_MINOR) {
     Refuse(path, "needs plugin ABI " + Version(tag.abi_major, tag.needs_minor) +

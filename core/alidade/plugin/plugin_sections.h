@@ -17,7 +17,7 @@ AlidadeBuildTag ReadBuildTag(const std::filesystem::path& file);
 namespace internal {
 
 /// Returns false if the plugin lists the names of its entries and the list contains none of
-/// `names`. Such a plugin need not be loaded.
+/// `names`. The plugin then need not be loaded.
 bool MayOffer(const std::filesystem::path& file, const std::set<std::string>& names);
 
 }  // namespace internal

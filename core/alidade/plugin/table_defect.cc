@@ -16,9 +16,10 @@ std::string Number(std::uint64_t i) { return std::to_string(i); }
 
 std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
   if (entry.struct_size < offsetof(AlidadeEntry, reserved) || entry.struct_size > stride) {
-    return "states a size of " + Number(entry.struct_size) + " bytes";
+    return "states a size of " + Number(entry.struct_size) + " bytes; expected " +
+           Number(offsetof(AlidadeEntry, reserved)) + " to " + Number(stride);
   }
-  if (!IsValidName(entry.name)) return "has no name";
+  if (!IsValidName(entry.name)) return "has no valid name";
   const std::pair<const char*, const char*> texts[] = {{"family", entry.family},
                                                        {"doc", entry.doc},
                                                        {"citation", entry.citation},
@@ -30,14 +31,14 @@ std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
   if (!IsKnown(entry)) return {};
   const std::string unknown = UnknownBits(entry.flags | entry.thread_flags, 0);
   if (!unknown.empty()) return "has flags that this version does not know: " + unknown;
-  if (!AllZero(entry.reserved)) return "uses reserved members";
+  if (!AllZero(entry.reserved)) return "uses reserved members, which must be zero";
   if (entry.create == nullptr) return "has no create function";
   return {};
 }
 
 std::string EntryDefect(const CppEntry& entry) {
   if (Text(entry.kind).empty()) return "an entry of its table has no kind";
-  if (!IsValidName(entry.name)) return WithArticle(entry.kind) + " has no name";
+  if (!IsValidName(entry.name)) return WithArticle(entry.kind) + " has no valid name";
   if (entry.factory == nullptr) return std::string(entry.name) + " has no factory";
   return {};
 }
@@ -53,20 +54,22 @@ std::string TableDefect(const AlidadeTable* source) {
   const AlidadeTable table = ReadPrefix(source);
   if (table.magic != ALIDADE_MAGIC) return "its table has the wrong magic number";
   if (table.struct_size < offsetof(AlidadeTable, reserved)) {
-    return "its table states a size of " + Number(table.struct_size) + " bytes";
+    return "its table states a size of " + Number(table.struct_size) +
+           " bytes; expected at least " + Number(offsetof(AlidadeTable, reserved));
   }
   if (table.abi_major != ALIDADE_ABI_MAJOR) {
-    return "its table has ABI major " + Number(table.abi_major);
+    return "its table states ABI major version " + Number(table.abi_major) + "; expected " +
+           Number(ALIDADE_ABI_MAJOR);
   }
   const std::string unknown = UnknownBits(table.flags, 0);
   if (!unknown.empty()) return "its table has flags that this version does not know: " + unknown;
-  if (!AllZero(table.reserved)) return "its table uses reserved members";
+  if (!AllZero(table.reserved)) return "its table uses reserved members, which must be zero";
   if (!IsValidStride<AlidadeEntry>(table.entry_stride)) {
-    return "its table states an entry stride of " + Number(table.entry_stride) + " bytes";
+    return "its table states an invalid entry stride of " + Number(table.entry_stride) + " bytes";
   }
   if (table.entry_count == 0 || table.entry_count > std::uint32_t{ALIDADE_MAX_ENTRIES} ||
       table.entries == nullptr) {
-    return "its table has " + Number(table.entry_count) + " entries";
+    return "its table has " + Number(table.entry_count) + " entries or a null pointer to them";
   }
   std::set<std::pair<std::uint32_t, std::string>> names;
   for (std::uint32_t i = 0; i < table.entry_count; ++i) {
@@ -83,7 +86,8 @@ std::string TableDefect(const AlidadeTable* source) {
 std::string TableDefect(const CppPluginTable* table) {
   if (table == nullptr) return "its table is null";
   if (table->struct_size != sizeof(CppPluginTable)) {
-    return "its table states a size of " + Number(table->struct_size) + " bytes";
+    return "its table states a size of " + Number(table->struct_size) + " bytes; expected " +
+           Number(sizeof(CppPluginTable));
   }
   if (table->entries == nullptr || table->entry_count < 1) return "its table is empty";
   std::set<std::pair<std::string, std::string>> names;

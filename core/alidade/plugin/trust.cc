@@ -76,7 +76,7 @@ class TrustCheck {
     for (char** member = entry->gr_mem; *member != nullptr; ++member) {
       if (name != *member) return false;
     }
-    bool is_shared = false;  // whether the group is also the primary group of another user
+    bool is_shared = false;  // true if another user has this primary group
     setpwent();
     while (const passwd* const other = getpwent()) {
       is_shared = is_shared || (other->pw_gid == id && other->pw_uid != user_id);
@@ -93,7 +93,7 @@ class TrustCheck {
       writer = "its group";
     }
     if (writer == nullptr) return;
-    Fail(path, std::string("writable for ") + writer + "; chmod go-w " + path.string());
+    Fail(path, std::string("writable by ") + writer + "; run 'chmod go-w " + path.string() + "'");
   }
 
   fs::path file_;

@@ -19,8 +19,8 @@ int Covariance::Add(int rows) {
 void Covariance::Reserve(int rows) {
   const int needed = size_ + rows;
   if (needed <= capacity_) return;
-  // Reserves an eighth more than requested, because a landmark has two representations while it is
-  // converted.
+  // Reserves an eighth more than requested, because the state contains two representations of a
+  // landmark during its conversion.
   const int capacity = internal::PaddedSize(std::max(2 * capacity_, needed + needed / 8));
   const auto side = static_cast<std::size_t>(capacity);
   AlignedNumbers larger(side * side, 0.0);
@@ -115,7 +115,7 @@ void Covariance::SetRows(std::span<const int> rows, const ConstMatrix& diagonal_
     p.row(row).head(row) = column.head(row).transpose();
     p.col(row).segment(row, height) = column.tail(height);
   }
-  // Replaces the elements of `cross` that lie in these rows.
+  // Overwrites the elements of `cross` that were copied to the diagonal block.
   for (std::size_t i = 0; i < rows.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       p(std::max(rows[i], rows[j]), std::min(rows[i], rows[j])) =

@@ -23,22 +23,23 @@ using ConstLowerTriangle = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStri
 /// Covariance P of a state in its tangent space. A block of rows is addressed by its offset and
 /// size. P is one dense symmetric matrix, of which only the lower triangle is valid. Its memory has
 /// spare capacity and consists of whole cache lines. lower() and view() return P without a copy.
-/// Offsets and sizes must come from Add; they are not checked. Once the capacity suffices, only
-/// functions that return a matrix allocate memory. projection.h computes P H' and H P H'.
+/// Offsets and sizes must belong to rows that Add created; they are not checked. If the capacity is
+/// sufficient, only functions that return a matrix allocate memory. The functions in projection.h
+/// compute P H' and H P H'.
 class Covariance {
  public:
   /// Returns the number of rows in use, including gaps. A gap has zero rows and columns.
   int size() const { return size_; }
 
   /// Adds `rows` > 0 rows and columns of zeros. Returns their offset. Uses the smallest gap that is
-  /// large enough, or the end if no gap is. Amortised O(n).
+  /// large enough. If no gap is large enough, appends the rows. Amortised O(n).
   int Add(int rows);
-  /// Allocates memory for `rows` further rows and an eighth more, or for twice the capacity if that
-  /// is larger. Add calls it.
+  /// Provides memory for `rows` further rows. If the capacity is not sufficient, allocates memory
+  /// for 9/8 of the required size, or for twice the capacity if this is larger. Add calls Reserve.
   void Reserve(int rows);
   /// Releases the rows [offset, offset + rows). O(n).
   void Release(int offset, int rows);
-  /// Moves rows into the smallest gap that is large enough, and releases their former place.
+  /// Moves rows into the smallest gap that is large enough, and releases their old position.
   /// Returns their new offset. Returns -1 and changes nothing if no gap is large enough. O(n).
   int MoveToGap(int offset, int rows);
 
@@ -50,17 +51,19 @@ class Covariance {
   void SetBlock(int a, int b, const ConstMatrix& value);
   /// Returns P(i, i), 0 <= i < size().
   double Variance(int i) const { return p()(i, i); }
-  /// Sets rows and columns [offset, offset + k): their diagonal block to `diagonal_block` (k x k),
-  /// all other elements to zero.
+  /// Sets the rows and columns [offset, offset + k). Their diagonal block becomes `diagonal_block`
+  /// (k x k). All other elements become zero.
   void SetRows(int offset, const ConstMatrix& diagonal_block);
-  /// Sets k rows and columns: their own block to `diagonal_block` (k x k), all other elements to
-  /// those of `cross` (n x k, n = size()).
+  /// Sets the k rows `rows` and the columns with the same indices. The elements in these rows and
+  /// columns become `diagonal_block` (k x k). All other elements become those of `cross` (n x k, n
+  /// = size()).
   void SetRows(std::span<const int> rows, const ConstMatrix& diagonal_block,
                const ConstMatrix& cross);
 
   /// Propagates k rows by x' = F x + N v, v ~ N(0, I), C = Cov(F x, N v):
-  /// P_aa <- F P_aa F' + N N' + C + C',  P_ai <- F P_ai. Row-major: F k x k, N k x width, C k x k;
-  /// null means zero. O(n k). Returns false and changes nothing if a variance would not be finite.
+  /// P_aa <- F P_aa F' + N N' + C + C',  P_ai <- F P_ai. F is k x k, N is k x width and C is k x k,
+  /// all row-major. A null pointer means zero. O(n k). Returns false and changes nothing if a
+  /// variance would not be finite.
   bool Propagate(std::span<const int> rows, const double* f, const double* noise = nullptr,
                  int width = 0, const double* cross = nullptr);
 

@@ -7,8 +7,8 @@
 #include "alidade/state/jacobian_rows.h"
 
 /// Products and decompositions of dense matrices, for code outside inner loops. They are compiled
-/// only once: Eigen's templates, compiled for each combination of operands, would dominate the
-/// build time.
+/// only once. Otherwise Eigen's templates would be compiled for each combination of operands, which
+/// would dominate the build time.
 namespace alidade::internal {
 
 Eigen::MatrixXd Product(const ConstMatrix& a, const ConstMatrix& b);            ///< returns A B
@@ -23,15 +23,15 @@ Eigen::MatrixXd SolvePositive(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b
 /// Returns the X of least norm that minimises |A X - B|; A may have any shape and rank.
 Eigen::MatrixXd SolveLeastNorm(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
-/// Computes a square root A of a symmetric, positive semi-definite P = A A', singular or not, from
-/// the pivoted L D L' of its lower triangle. Replaces negative pivots by zero. Returns the most
-/// negative pivot divided by the largest variance, or 0 if no pivot is negative. `ldlt` is scratch
-/// memory.
+/// Computes a square root A of a symmetric, positive semi-definite matrix P = A A', which may be
+/// singular. Uses the pivoted factorisation L D L' of the lower triangle of P. Replaces negative
+/// pivots by zero. Returns the most negative pivot divided by the largest variance, or 0 if no
+/// pivot is negative. `ldlt` is scratch memory.
 double SquareRootOf(const Eigen::Ref<const Eigen::MatrixXd>& p, Eigen::LDLT<Eigen::MatrixXd>& ldlt,
                     Eigen::MatrixXd& root);
 
-/// Returns e' P^-1 e; NaN if P is singular, indefinite or not finite. First scales P to unit
-/// variances, so the test for singularity does not depend on units.
+/// Returns e' P^-1 e, or NaN if P is singular, indefinite or not finite. First scales P to unit
+/// variances, so that the test for singularity does not depend on units.
 double SquaredMahalanobis(const Eigen::MatrixXd& p, const Eigen::VectorXd& error);
 
 /// Eigenvalues l, in increasing order, and eigenvectors V of A = V diag(l) V'.
@@ -61,7 +61,7 @@ Eigen::MatrixXd ComplementOf(const Eigen::MatrixXd& a);
 
 /// Returns x that minimises |A x - b|, by QR with column pivoting. A may have any rank.
 Eigen::VectorXd SolveByPivoting(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
-/// Returns the rank of A. Pivots below `threshold` times the largest one count as zero.
+/// Returns the rank of A. Pivots below `threshold` times the largest pivot count as zero.
 int RankOf(const Eigen::MatrixXd& a, double threshold);
 
 }  // namespace alidade::internal

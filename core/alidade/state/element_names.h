@@ -10,9 +10,9 @@ namespace alidade::internal {
 
 /// Splits a text such as "x,y,z" at its commas and removes spaces. Returns {""} for "".
 std::vector<std::string> SplitNames(const std::string& names);
-/// Returns the names of the ambient elements: the parts of `names`, or the default names of the
-/// geometry if `names` is "". The defaults are w, x, y, z for a quaternion, numbers for a vector,
-/// and "" for a scalar. The geometry must not be a product.
+/// Returns the names of the ambient elements. These are the parts of `names`, or the default names
+/// of the geometry if `names` is "". The default names are w, x, y, z for a quaternion, numbers for
+/// a vector, and "" for a scalar. The geometry must not be a product.
 std::vector<std::string> ElementsOf(const std::string& names, const Geometry& geometry);
 
 /// Returns ColumnNames(), or NumberedNames() if the space does not name its elements.

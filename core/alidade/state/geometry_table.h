@@ -14,12 +14,12 @@
 namespace alidade {
 
 /// Entry of the table of geometries: the properties of a geometry, and its functions for doubles.
-/// The entries of a vector and a product have no functions, because the model determines the sizes.
+/// The entries of a vector and a product have no functions, because a model determines their sizes.
 struct GeometryRow {
-  std::uint32_t number = 0;  ///< number of the geometry in the C table
+  std::uint32_t number = 0;  ///< number of the geometry in the plugin ABI
   const char* name = "";
   const char* elements = "";          ///< comma-separated element names of a value; "": numbers
-  const char* tangent_elements = "";  ///< element names of a difference; "": same as `elements`
+  const char* tangent_elements = "";  ///< element names of a difference; "": equal to `elements`
   std::uint32_t angular = 0;          ///< bit i: element i of a difference is an angle in rad
   bool double_cover = false;          ///< true if x and -x are the same value
   int ambient = 0, tangent = 0;       ///< sizes of a value and a difference; 0: set by the model
@@ -82,8 +82,8 @@ struct TypedRow : GeometryRow {
   }
 };
 
-/// All geometries of fixed size. To add one, add a struct to alidade/model/geometry.h and an entry
-/// here.
+/// All geometries of fixed size. To add a geometry, add a struct to alidade/model/geometry.h and an
+/// entry here.
 inline constexpr std::tuple kGeometries{
     TypedRow<Angle>({.name = "angle", .angular = 0b1}),
     TypedRow<UnitQuaternion>({.name = "unit_quaternion",
@@ -113,7 +113,8 @@ static_assert(kMaxTangent <= 32, "GeometryRow::angular has 32 bits");
 
 }  // namespace detail
 
-/// Returns the entry of a geometry by its number in the C table; null if the number is unknown.
+/// Returns the entry of the geometry with this number in the plugin ABI, or null if the number is
+/// unknown.
 constexpr const GeometryRow* FindGeometry(std::uint32_t number) {
   for (const GeometryRow* row : detail::kGeometryRows) {
     if (row->number == number) return row;
@@ -121,8 +122,8 @@ constexpr const GeometryRow* FindGeometry(std::uint32_t number) {
   return nullptr;
 }
 
-/// Calls f(G{}); G is the struct of the geometry that has this number. Vectors and products have no
-/// fixed size: for these it returns false and does not call f.
+/// Calls f(G{}) and returns true. G is the struct of the geometry with this number. For vectors and
+/// products, which have no fixed size, returns false without calling f.
 template <class F>
 bool VisitGeometry(std::uint32_t number, const F& f) {
   const auto visit = [&](const auto& row) {

@@ -43,9 +43,10 @@ InstructionSet BestInstructionSet() {
       if (std::string_view(requested) == ToString(set)) return set;
       names.append(names.empty() ? "" : ", ").append(ToString(set));
     }
-    throw Error(ExitCode::kUsage,
-                "environment variable ALIDADE_KERNELS: '" + std::string(requested) +
-                    "' is not available on this processor; expected one of " + names);
+    throw Error(ExitCode::kUsage, "environment variable ALIDADE_KERNELS: the instruction set '" +
+                                      std::string(requested) +
+                                      "' is not available on this processor; expected one of " +
+                                      names);
   }();
   return best;
 }

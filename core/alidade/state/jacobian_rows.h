@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// Row-major matrix, as in the plugin ABI.
+/// Matrix in row-major order, which is the order of the plugin ABI.
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// Read-only view of a matrix or of a block of a matrix.
@@ -21,12 +21,12 @@ struct JacobianPart {
   int column;  ///< index of the first of these columns
 };
 
-/// Non-zero columns of a Jacobian with m rows and n columns. If a column is listed twice, its value
-/// is the sum of both.
+/// Non-zero columns of a Jacobian with m rows and n columns. If `columns` contains an index twice,
+/// the two columns are added.
 struct JacobianRows {
   const double* data;  ///< m x width, row-major
   int rows;
-  std::span<const int> columns;  ///< index in P of each column; `width` indices
+  std::span<const int> columns;  ///< row of P to which each of the `width` columns belongs
 
   int width() const { return static_cast<int>(columns.size()); }
 };

@@ -9,8 +9,8 @@
 
 namespace alidade::internal {
 
-/// Kalman update of n states by m rows of measurements. Later updates reuse the memory. The steps
-/// are
+/// Kalman update of n states by m rows of measurements. Later updates reuse the memory. An update
+/// consists of these steps:
 ///
 ///   Begin        allocates P H'
 ///   ComputeNis   for each measurement i:  P H_i',  S_i = H_i P H_i' + R_i,  r_i' S_i^-1 r_i
@@ -24,15 +24,15 @@ class KalmanUpdate {
   /// Starts an update of P by at most `capacity` rows. The memory of P must not move until the
   /// update ends.
   void Begin(Covariance& p, int capacity);
-  /// Computes P H' of a measurement, in the measurement's columns, and its S. Returns its NIS, or
-  /// NaN if S is not finite and positive definite.
+  /// Computes S of a measurement, and P H' in the columns of the measurement. Returns the NIS, or
+  /// NaN unless S is finite and positive definite.
   double ComputeNis(const MeasurementRows& measurement) {
     return Kernels::For(kernels_->nis, measurement.h.rows)(update_, measurement);
   }
   /// Moves P H' of a measurement from column `source` to `destination` < `source`.
   void MoveColumns(int source, int destination, int count);
-  /// Computes L, D, W, dx and, if `needs_gain`, K of the update by `measurements`, whose columns
-  /// are adjacent.
+  /// Computes L, D, W and dx of the update by `measurements`, whose columns must be adjacent. Also
+  /// computes K if `needs_gain` is true.
   Solution Solve(std::span<const MeasurementRows* const> measurements, bool needs_gain);
   /// Replaces P by P - W D^-1 W'.
   void Downdate() { Kernels::For(kernels_->downdate, update_.m)(update_); }
@@ -41,10 +41,10 @@ class KalmanUpdate {
   double* dx() { return update_.dx; }
   /// Returns L^-1 r.
   std::span<const double> y() const { return {update_.y, static_cast<std::size_t>(update_.m)}; }
-  /// Returns K(i, j); requires `needs_gain` in Solve.
+  /// Returns K(i, j). Requires that `needs_gain` was true in Solve.
   double& gain(int i, int j) const { return update_.At(update_.gain, i, j); }
-  /// Copies the given rows of `count` columns of K, column by column. Requires `needs_gain` in
-  /// Solve.
+  /// Copies the rows `rows` of `count` columns of K, column by column. Requires that `needs_gain`
+  /// was true in Solve.
   void CopyGain(std::span<const int> rows, int column, int count, double* destination) const {
     if (update_.p.size > update_.panel_rows)
       return CopyGainOfPanels(rows, column, count, destination);
@@ -52,11 +52,11 @@ class KalmanUpdate {
       for (const int i : rows) *destination++ = update_.gain[j * update_.panel_rows + i];
     }
   }
-  /// Copies columns to `destination`, which has n rows: columns of P H' before Solve(), columns of
-  /// W after Solve().
+  /// Copies columns of P H' to `destination`, which has n rows. After Solve(), copies columns of W
+  /// instead.
   void CopyColumns(int column, Eigen::Ref<Eigen::MatrixXd> destination) const;
   double w(int i, int j) const { return update_.At(update_.w, i, j); }
-  /// Copies L sqrt(D) to the lower triangle of an m x m matrix: S = L D L' = l l'.
+  /// Copies l = L sqrt(D) to the lower triangle of an m x m matrix, so that S = L D L' = l l'.
   void CopyFactor(Eigen::Ref<Eigen::MatrixXd> l) const;
 
  private:

@@ -9,7 +9,9 @@
 
 #include "alidade/base/all_finite.h"
 
-#pragma GCC diagnostic ignored "-Wpsabi"  // vectors are inlined, never passed
+// g++ warns that the ABI for vector arguments differs. The warning does not apply, because only
+// inlined functions have such arguments.
+#pragma GCC diagnostic ignored "-Wpsabi"
 
 #define ALIDADE_KERNEL [[gnu::always_inline]] static inline
 #define ALIDADE_UNROLL _Pragma("GCC unroll 8")
@@ -19,15 +21,15 @@ namespace {
 
 constexpr int kSmall = 8;
 
-/// If an update reduces a variance below this fraction of itself, the result has lost nearly all
-/// digits.
+/// If an update reduces a variance below this fraction of its old value, the new value has lost
+/// nearly all digits.
 constexpr double kCancelled = 1e-10;
 
 /// Returns true if x is positive and finite.
 inline bool IsPositive(double x) { return x > 0.0 && x < std::numeric_limits<double>::infinity(); }
 
-/// Column of all N states of a small filter, processed number by number. A vector load of numbers
-/// that were just written one by one would wait for the stores.
+/// Column of all N states of a small filter, processed number by number. A vector load would be
+/// slower: it would wait for the preceding stores of single numbers.
 template <int N>
 struct Scalars {
   static constexpr int kRows = N, kStates = N;
@@ -48,7 +50,7 @@ struct Scalars {
   }
 };
 
-/// Column of N out of many states, in one vector register.
+/// Column of N states of a large filter, in one vector register.
 template <int N>
 struct Vector {
   static constexpr int kRows = N, kStates = 0;
@@ -68,8 +70,8 @@ struct Vector {
 template <class Column, int M>
 struct Arithmetic {
   static constexpr int kRows = Column::kRows, kStates = Column::kStates;
-  /// Height of a tile of the downdate, in panels. It provides enough independent sums to fill the
-  /// pipelines.
+  /// Height of a tile of the downdate, in panels. With this height, a tile has enough independent
+  /// sums to fill the pipelines.
   static constexpr int kTileHeight = kStates > 0 ? 1 : 2;
 
   // These functions return the size of a small state or update as a constant that the compiler
@@ -255,8 +257,8 @@ struct Arithmetic {
       }
     }
   }
-  /// Multiplies H of a measurement by P H' of the preceding measurements, a few columns of H at a
-  /// time.
+  /// Multiplies H of a measurement by P H' of the preceding measurements. Processes a few columns
+  /// of H at a time.
   ALIDADE_KERNEL void StackCrossTerms(const Update& u, const MeasurementRows& measurement,
                                       int stride) {
     constexpr int kBatch = 16;
@@ -373,8 +375,8 @@ struct Arithmetic {
   }
 
   /// Subtracts from a tile of P the contribution of columns [first, last) of W. The tile has kTile
-  /// panels of rows from row i on, and one panel of columns from column j on. `scaled` is D^-1
-  /// times W of the panel at j.
+  /// panels of rows from row i on, and one panel of columns from column j on. `scaled` is W D^-1 of
+  /// the panel that begins at row j.
   template <int kTile>
   ALIDADE_KERNEL void Tile(const Update& u, int first, int last, int i, int j,
                            const double* scaled) {
@@ -400,7 +402,7 @@ struct Arithmetic {
       ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) sum[c][t].Store(p + c * stride + t * kRows);
     }
   }
-  /// Computes P' block by block. The rows and columns of W of a block fit into the L2 cache.
+  /// Computes P' block by block. The elements of W that a block needs fit into the L2 cache.
   ALIDADE_KERNEL void Downdate(const Update& u) {
     constexpr int kDepth = 256, kHeight = kStates > 0 ? kRows : 24 * kTileHeight * kRows;
     const int n = Sized(u.p).size, m = Rows(u.m);
@@ -474,7 +476,8 @@ struct Arithmetic {
     const int k = static_cast<int>(step.rows.size());
     return sum + step.cross[r * k + c] + step.cross[c * k + r];
   }
-  /// Computes c += a b, row-major: a rows x inner, b inner x PaddedSize(k), c rows x PaddedSize(k).
+  /// Computes c += a b. All matrices are row-major: a is rows x inner, b is inner x PaddedSize(k),
+  /// and c is rows x PaddedSize(k).
   ALIDADE_KERNEL void AddProduct(int rows, int inner, int k, const double* a, const double* b,
                                  double* c) {
     for (int i = 0; i < k; i += kRows) {
@@ -483,8 +486,8 @@ struct Arithmetic {
       for (; r < rows; ++r) AddRows<1>(r, inner, i, PaddedSize(k), a, b, c);
     }
   }
-  /// Computes c += a b for kBatch rows from row r on, and the columns from column i on. The rows
-  /// use the same loads of b.
+  /// Computes c += a b for kBatch rows from row r on, and kRows columns from column i on. The rows
+  /// share the loads of b.
   template <int kBatch>
   ALIDADE_KERNEL void AddRows(int r, int inner, int i, int stride, const double* a, const double* b,
                               double* c) {
@@ -559,7 +562,8 @@ struct Arithmetic {
   }
 };
 
-/// Defines the table of kernels of a Column, compiled for an instruction set.
+/// Defines the class template `table`: the kernels for columns of type Column, compiled for one
+/// instruction set.
 #define ALIDADE_KERNEL_TABLE(table, target, text)                                          \
   template <class Column>                                                                  \
   struct table {                                                                           \

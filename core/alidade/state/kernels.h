@@ -8,12 +8,12 @@
 #include "alidade/state/jacobian_rows.h"
 
 /// Arithmetic of a Kalman filter on raw memory. kernels.cc contains the source of each kernel once.
-/// It is compiled for 1 to 8 states with unrolled loops. For any number of states it is compiled
-/// once for each instruction set, and processes panels of vector registers. The results of the sets
-/// differ only by rounding.
+/// The source is compiled with unrolled loops for each number of states from 1 to 8. For any number
+/// of states, it is compiled once for each instruction set. These kernels process panels of vector
+/// registers. The results of the instruction sets differ only by rounding.
 namespace alidade::internal {
 
-/// Returns the size of memory for n rows or columns, in whole cache lines.
+/// Rounds n up to a multiple of 8, so that a row or column of n numbers fills whole cache lines.
 constexpr int PaddedSize(int n) { return (n + 7) & ~7; }
 
 /// View of a symmetric n x n matrix, stored column by column. Only the lower triangle is used. The
@@ -41,8 +41,8 @@ struct MeasurementRows {
 ///   S = H P H' + R = L D L'     W = P H' L^-T     dx = W D^-1 L^-1 r     K = W D^-1 L^-1
 ///   P' = P - W D^-1 W'
 ///
-/// P H', W and K are n x m. They are stored in panels of Kernels::panel_rows rows, each panel
-/// column by column: see At().
+/// P H', W and K are n x m. They are stored in panels of Kernels::panel_rows rows. Each panel is
+/// stored column by column (see At).
 struct Update {
   SymmetricView p;
   /// Measurements, in the order of their columns.
@@ -50,13 +50,13 @@ struct Update {
   int m;
   int capacity;  ///< number of columns for which a panel has memory
   int panel_rows;
-  double* w;                  ///< P H', later W; PaddedSize(n) x capacity
-  double* s;                  ///< S, later L, column-major; PaddedSize(capacity) x capacity
+  double* w;                  ///< P H', replaced by W; PaddedSize(n) x capacity
+  double* s;                  ///< S, replaced by L; column-major; PaddedSize(capacity) x capacity
   double* inverse_d;          ///< reciprocals of D; size `capacity`
   double* y;                  ///< L^-1 r; size `capacity`
   double* dx;                 ///< correction of the state; size PaddedSize(n)
   double* variance_decrease;  ///< diagonal of W D^-1 W'; size PaddedSize(n)
-  double* gain;               ///< K, of the same size as w; null if K is not needed
+  double* gain;               ///< K, with the size of w; null if K is not needed
 
   /// Returns element (i, j) of a matrix in panels.
   double& At(double* panels, int i, int j) const {
@@ -95,9 +95,9 @@ struct Transition {
 struct Kernels {
   const char* name;  ///< name of the instruction set: `baseline`, `AVX2`, `AVX-512`
   int panel_rows;
-  // The three kernels of an array are compiled for 1 row, 2 rows and any number of rows: see For().
+  // The three kernels of an array are compiled for 1 row, 2 rows and any number of rows (see For).
   /// Computes S and P H' of a measurement. Writes P H' to the columns of w from
-  /// `measurement.column` on. Returns the NIS, r' S^-1 r, or NaN if S is not finite and positive
+  /// `measurement.column` on. Returns the NIS, r' S^-1 r, or NaN unless S is finite and positive
   /// definite. Overwrites s, inverse_d and y.
   double (*nis[3])(const Update& update, const MeasurementRows& measurement);
   /// Computes the results of an update except P'. `nis` must have computed P H' of each

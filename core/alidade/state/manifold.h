@@ -10,11 +10,11 @@
 
 namespace alidade {
 
-/// Largest accepted deviation from 1 of the length of a unit vector or quaternion that comes from
-/// outside the library.
+/// Largest accepted difference between 1 and the length of a unit vector or quaternion that a user
+/// of the library provides.
 inline constexpr double kUnitTolerance = 1e-3;
 
-/// One of the geometries of alidade/model/geometry.h, selected at run time, with its size.
+/// Geometry of alidade/model/geometry.h that is selected at run time, with its size.
 class Geometry {
  public:
   int ambient = 1;
@@ -23,8 +23,8 @@ class Geometry {
 
   /// Constructs R^1.
   Geometry() : Geometry(ALIDADE_VECTOR) {}
-  /// Constructs the geometry with this number in the C table, which must not be a product. `size`
-  /// applies only to a vector.
+  /// Constructs the geometry with this number in the plugin ABI, which must not be a product.
+  /// `size` is used only for a vector.
   explicit Geometry(std::uint32_t number, int size = 1);
   /// Returns the geometry of the struct G of geometry.h. `size` is the size of a vector whose size
   /// is known only at run time (kDynamic).
@@ -44,8 +44,8 @@ class Geometry {
   bool is_vector() const { return row_->number == ALIDADE_VECTOR; }
   bool is_product() const { return row_->number == ALIDADE_PRODUCT; }
   bool is_angle() const { return row_->number == ALIDADE_ANGLE; }
-  /// Returns true if the basis of the tangent space rotates when the point moves, and a covariance
-  /// with it. For a product, returns true if this holds for any part.
+  /// Returns true if the basis of the tangent space rotates when the point moves. A covariance must
+  /// then be transported. For a product, returns true if this holds for any part.
   bool has_transport() const;
   /// Returns true if element `i` of a difference is an angle in rad.
   bool IsAngular(int i) const;
@@ -77,7 +77,7 @@ class Geometry {
   /// along the geodesic to the tangent space of y. The matrix is the identity unless
   /// has_transport() is true.
   void Transport(const double* x, const double* y, double* j) const;
-  /// Moves x to the nearest point of the manifold; wraps an angle.
+  /// Moves x to the nearest point of the manifold. Wraps angles.
   void Normalise(double* x) const;
   /// Returns the neutral element: zeros for a vector or an angle, (1, 0, 0, 0) for a quaternion,
   /// (0, 0, 1) for a unit vector.
@@ -107,8 +107,8 @@ inline void WrapAngles(const Geometry& geometry, double* x) {
   if (!geometry.is_vector()) internal::WrapParts(geometry, x);
 }
 
-/// Returns the name of a geometry: `vector(3)`, `angle`, `unit_quaternion`, `unit_vector`,
-/// `product(vector(3), unit_quaternion)`.
+/// Returns the name of a geometry, such as `vector(3)`, `angle` or `product(vector(3),
+/// unit_quaternion)`.
 std::string ToString(const Geometry& geometry);
 
 /// Named quantity with its geometry: a role, a measurement, a control input or a state block.
@@ -126,7 +126,8 @@ struct Space {
   bool shared() const { return (flags & ALIDADE_ROLE_SHARED) != 0; }
 };
 
-/// Returns the column names of a value: `name` or `name.element` for each ambient element.
+/// Returns the column names of a value: `name.element` for each ambient element, or `name` for an
+/// element without a name.
 std::vector<std::string> ColumnNames(const std::string& name, const Space& space);
 
 }  // namespace alidade

@@ -5,8 +5,8 @@
 #include <numeric>
 #include <span>
 
-/// Choice of the sign of a quaternion. q and -q represent the same rotation; outputs contain one of
-/// them.
+/// Choice of the sign of a quaternion. q and -q represent the same rotation. An output contains
+/// only one of these two quaternions.
 namespace alidade::internal {
 
 /// Replaces q by -q if -q is nearer to `reference`. If `reference` is empty, makes the first

@@ -137,7 +137,8 @@ void State::Initialise(std::span<const BlockId> ids, const double* values,
   covariance_.SetRows(rows_, p, cross);
 }
 
-/// Computes rows_ and columns_ of the blocks. Returns the total tangent size of the blocks.
+/// Sets rows_ and columns_ to the rows and columns of the blocks. Returns the total tangent size of
+/// the blocks.
 int State::FindRows(std::span<const BlockId> blocks) {
   rows_.clear();
   columns_.clear();
@@ -166,7 +167,8 @@ void State::Release(BlockId id) {
   FillGaps();
 }
 
-/// Moves the last block into a gap, and repeats this while a gap is large enough.
+/// Moves the last block of P into a gap. Repeats this until no gap is large enough for the last
+/// block.
 void State::FillGaps() {
   for (;;) {
     const auto last_id = std::ranges::max_element(

@@ -16,7 +16,7 @@ namespace alidade {
 /// Index of a block in its layout. The index stays valid when other blocks are added or removed.
 using BlockId = int;
 
-/// How the estimator treats a block.
+/// Status of a block, which determines the treatment of the block by the estimator.
 enum class BlockStatus {
   kEstimated,  ///< updates correct the block
   kConsider,   ///< the block has a covariance and correlations, but no update corrects it (Schmidt)
@@ -31,7 +31,7 @@ struct Block {
   BlockStatus status = BlockStatus::kEstimated;
   bool present = false;   ///< whether the block has a value; false until it is initialised
   int value_offset = -1;  ///< offset in State::values(); -1 unless present or reserved
-  /// Offset in Covariance; -1 if constant, or neither present nor reserved.
+  /// Offset in Covariance; -1 if the block is constant, or neither present nor reserved.
   int tangent_offset = -1;
 
   const Geometry& geometry() const { return space.geometry; }
@@ -41,7 +41,7 @@ struct Block {
 /// Names, geometries and offsets of the blocks, without their values.
 class StateLayout {
  public:
-  /// Adds a block without a value. Error: ContractViolation if another block has this name.
+  /// Adds a block without a value. ContractViolation if another block has this name.
   BlockId Declare(std::string_view name, std::string_view owner, const Space& space,
                   BlockStatus status = BlockStatus::kEstimated);
   const std::vector<Block>& blocks() const { return blocks_; }
@@ -62,13 +62,13 @@ struct BlockEstimate {
   Eigen::VectorXd value, sigma;
 };
 
-/// State of an estimator: the layout, values and covariance of its blocks, which always agree.
-/// Copyable.
+/// State of an estimator: the layout, values and covariance of its blocks, which are always
+/// consistent. A State can be copied.
 ///
-/// x is one buffer of ambient values, P the covariance in the tangent space. Adding or removing a
-/// block moves O(n) numbers. A removed block leaves a gap. The last block is moved into the gap if
-/// it fits; otherwise a block that is added later may use the gap. Setting the value of a block
-/// does not move the block in memory.
+/// x is one buffer of ambient values. P is the covariance in the tangent space. Adding or removing
+/// a block moves O(n) numbers. A removed block leaves a gap. If the last block fits into the gap,
+/// it is moved there. Otherwise a block that is added later may use the gap. Setting the value of a
+/// block does not move the block in memory.
 class State {
  public:
   explicit State(StateLayout layout = {}) : layout_(std::move(layout)) {}
@@ -80,10 +80,10 @@ class State {
   /// Returns the ambient value of a present block. The pointer is valid until a block is added or
   /// values() is replaced.
   const double* value(BlockId id) const { return values_.data() + layout_[id].value_offset; }
-  /// Returns the standard deviation of tangent element i of a present block; 0 if the block is
+  /// Returns the standard deviation of tangent element i of a present block, or 0 if the block is
   /// constant.
   double sigma(BlockId id, int i = 0) const;
-  /// Returns the estimate of a block. Error: ContractViolation if the block is not present.
+  /// Returns the estimate of a block. ContractViolation if the block is not present.
   BlockEstimate Estimate(BlockId id) const;
   const std::vector<double>& values() const { return values_; }
   std::vector<double>& values() { return values_; }
@@ -93,25 +93,25 @@ class State {
                   BlockStatus status = BlockStatus::kEstimated) {
     return layout_.Declare(name, owner, space, status);
   }
-  /// Reserves the memory of a declared block's value, and zero rows of the covariance.
+  /// Reserves memory for the value of a declared block, and adds rows of zeros to the covariance.
   void Reserve(BlockId id);
   /// Sets the value and covariance of a declared block. Its correlations with other blocks become
-  /// zero. The covariance, in the tangent space, is ignored for a constant block.
+  /// zero. The covariance is that of the tangent elements; it is ignored for a constant block.
   void Add(BlockId id, const double* value, const ConstMatrix& covariance);
-  /// Initialises the declared blocks `ids` with y = g(x, n), one after the other. `sources` are the
-  /// blocks of x, disjoint from `ids`. With dy = J dx + J_n dn the covariance of y is J P_xx J' +
-  /// noise_covariance, and its correlation with all other blocks is J P_x. J is row-major; its
-  /// columns are the tangent elements of the sources, in their order; noise_covariance = J_n Cov(n)
-  /// J_n'.
+  /// Initialises the declared blocks `ids` with y = g(x, n). `values` contains y, the concatenated
+  /// values of these blocks. `sources` are the blocks of x, which must not be among `ids`. If dy =
+  /// J dx + J_n dn, the covariance of y is J P_xx J' + noise_covariance, and the covariance of y
+  /// with all other blocks is J P_x. J is row-major and has one column for each tangent element of
+  /// the sources, in their order. noise_covariance is J_n Cov(n) J_n'.
   void Initialise(std::span<const BlockId> ids, const double* values,
                   std::span<const BlockId> sources, const Eigen::Ref<const RowMajor>& jacobian,
                   const ConstMatrix& noise_covariance);
-  /// Removes a block. A block that is declared later may reuse the id. Values and covariance of the
-  /// other blocks do not change.
+  /// Removes a block. A block that is declared later may reuse the id. The values and covariances
+  /// of the other blocks do not change.
   void Remove(BlockId id);
-  /// Computes new_values: x_i (+) dx_i for each block with a covariance, and the present value of
-  /// every other block. dx has the same indices as the covariance. The state does not change (see
-  /// MoveTo). Returns true if all new values are finite.
+  /// Computes new_values: x_i (+) dx_i for each block with a covariance, and the current value of
+  /// every other block. The indices of dx are the row indices of the covariance. The state does not
+  /// change (see MoveTo). Returns true if all new values are finite.
   bool Retract(const double* dx, std::vector<double>& new_values) const;
   /// Sets all values, without moving them in memory. Transports P for each block whose tangent
   /// basis changes with its value.
@@ -129,18 +129,18 @@ class State {
   std::vector<double> values_;
   std::vector<std::pair<int, int>> value_gaps_;  ///< offset and size of each gap
   Covariance covariance_;
-  std::vector<BlockId> covariance_blocks_;  ///< blocks with rows of P, ascending
+  std::vector<BlockId> covariance_blocks_;  ///< blocks with rows in P, in ascending order
   /// True if x (+) dx = x + dx: all blocks are vectors with equal offsets in x and P.
   bool is_flat_ = true;
   Scratch<Workspace> memory_;
   // Results of FindRows().
   Scratch<std::vector<int>> rows_;  ///< rows of P
-  /// Columns of a Jacobian that has one for each tangent element.
+  /// Columns of a Jacobian that has one column for each tangent element of the blocks.
   Scratch<std::vector<int>> columns_;
 };
 
-/// Returns the Jacobian J of state.MoveTo(values), n x n, in `work`: an error dx before the move
-/// becomes J dx after it.
+/// Returns the Jacobian J of state.MoveTo(values), n x n, in `work`. An error dx before the move
+/// becomes J dx after the move.
 Workspace::Matrix TransportTo(const State& state, const std::vector<double>& values,
                               Workspace& work);
 

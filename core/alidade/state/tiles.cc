@@ -19,7 +19,7 @@ void ForEachTile(Eigen::Index size, const Visitor& visit) {
 Strided ByColumns(const ConstMatrix& a) { return {a.data(), 1, a.outerStride()}; }
 Strided Transposed(const ConstMatrix& a) { return {a.data(), a.outerStride(), 1}; }
 
-/// Computes C <- C + sign A B; A has `depth` columns.
+/// Computes C <- C + sign A B. A has `depth` columns.
 void Add(MutableMatrix& c, Eigen::Index depth, const Strided& a, const Strided& b, double sign,
          bool lower_only = false) {
   BestVectorKernels().add_product(c.rows(), c.cols(), depth, a, b, c.data(), c.outerStride(), sign,

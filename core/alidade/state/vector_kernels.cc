@@ -16,10 +16,10 @@
 namespace alidade::internal {
 namespace {
 
-/// Scratch memory that begins at a cache line. Later calls reuse it.
+/// Scratch memory that begins at a cache line. Later calls reuse the memory.
 class Buffer {
  public:
-  /// Returns memory for `size` uninitialised numbers, valid until the next call.
+  /// Returns memory for `size` uninitialised numbers. The memory is valid until the next call.
   double* Allocate(long size) {
     if (size > size_) {
       const long larger = std::max(size, 2 * size_);
@@ -365,7 +365,8 @@ struct Loops {
   }
 };
 
-/// Defines the loops, compiled for one instruction set. `target` is an attribute, or empty.
+/// Defines the class `kernels`, which contains the loops compiled for one instruction set. `target`
+/// is an attribute, or empty.
 #define ALIDADE_KERNELS(kernels, loops, target)                                                    \
   struct kernels {                                                                                 \
     target static void AddProduct(long rows, long columns, long depth, const Strided& a,           \

@@ -17,7 +17,8 @@ struct Strided {
 /// Kernels of one instruction set.
 struct VectorKernels {
   /// Computes C <- C + sign A B. C is rows x columns, column-major with leading dimension ldc. A is
-  /// rows x depth. `lower_only` restricts C to its lower triangle. C must not overlap A or B.
+  /// rows x depth. If `lower_only` is true, only the lower triangle of C is computed. C must not
+  /// overlap A or B.
   void (*add_product)(long rows, long columns, long depth, const Strided& a, const Strided& b,
                       double* c, long ldc, double sign, bool lower_only);
   /// Computes B <- B L^-T. B is rows x m. L is m x m and lower triangular. Both are column-major.
@@ -27,6 +28,7 @@ struct VectorKernels {
   bool (*factorise)(long m, double* s, long lds);
 };
 
+/// Returns the kernels of an instruction set.
 const VectorKernels& VectorKernelsOf(InstructionSet set);
 /// Returns the kernels of BestInstructionSet().
 const VectorKernels& BestVectorKernels();

@@ -14,12 +14,12 @@ namespace alidade {
 /// Allocator whose memory begins at a cache line.
 template <class T>
 struct CacheLines {
-  using value_type = T;  // NOLINT(readability-identifier-naming): of an allocator
+  using value_type = T;  // NOLINT(readability-identifier-naming): standard name
   static constexpr std::align_val_t kLine{64};
 
   CacheLines() = default;
   template <class U>
-  CacheLines(const CacheLines<U>& /*other*/) {}  // NOLINT(google-explicit-constructor): as well
+  CacheLines(const CacheLines<U>& /*other*/) {}  // NOLINT(google-explicit-constructor): required
   T* allocate(std::size_t count) {
     return static_cast<T*>(::operator new(count * sizeof(T), kLine));
   }
@@ -30,7 +30,7 @@ struct CacheLines {
 /// Numbers in memory that begins at a cache line.
 using AlignedNumbers = std::vector<double, CacheLines<double>>;
 
-/// Scratch memory. Copying the object that contains it does not copy the memory.
+/// Scratch memory. A copy of the object that contains a Scratch does not copy the memory.
 template <class T>
 struct Scratch : T {
   Scratch() = default;
@@ -38,15 +38,15 @@ struct Scratch : T {
   Scratch& operator=(const Scratch& /*other*/) { return *this; }
 };
 
-/// Memory for the matrices of a step or an update. Later steps and updates reuse the memory. It
-/// allocates only if they need more or larger matrices than before.
+/// Memory for the matrices of a step or an update. Later steps and updates reuse the memory. New
+/// memory is allocated only if a step or update needs more or larger matrices than before.
 class Workspace {
  public:
   using Matrix = Eigen::Map<Eigen::MatrixXd>;
   using Vector = Eigen::Map<Eigen::VectorXd>;
 
-  /// Scope in which memory is used. Its destructor releases the memory taken since its
-  /// construction.
+  /// Scope in which memory is used. The destructor releases the memory that Take returned after the
+  /// construction of this object.
   class Use {
    public:
     explicit Use(Workspace& workspace) : workspace_(workspace), used_(workspace.used_) {}

@@ -12,7 +12,7 @@
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/problem.h"
 
-/// Helpers for tests of filters: create frames, and read reports and states.
+/// Helper functions for tests of filters, which create frames and read reports and states.
 namespace alidade::testing {
 
 /// Returns one stream for each sensor of the problem, in the order of the sensors.
@@ -35,7 +35,7 @@ inline Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& valu
   return frame;
 }
 
-/// Returns whether the report has an event of this kind.
+/// Returns whether the report contains an event of this kind.
 inline bool HasEvent(const UpdateReport& report, EventKind kind) {
   return std::ranges::count(report.events, kind, &Event::kind) > 0;
 }

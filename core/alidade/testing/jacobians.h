@@ -10,10 +10,11 @@
 #include "alidade/base/error.h"
 #include "alidade/estimation/models.h"
 
-/// Helpers for tests of models: Jacobians that the model computes, and numeric Jacobians.
+/// Helper functions for tests of models. They return the Jacobians that a model computes, and
+/// numeric Jacobians.
 namespace alidade::testing {
 
-/// Ambient values of roles or blocks, one after the other.
+/// Ambient values of roles or blocks: one vector for each role or block.
 using Blocks = std::vector<std::vector<double>>;
 
 /// Returns the sum of the tangent sizes of the spaces.
@@ -44,8 +45,8 @@ inline Blocks Filled(const std::vector<Space>& spaces, double value) {
   return blocks;
 }
 
-/// Returns d f / d x, row-major, in the tangent spaces of x and f(x). `inputs` are the spaces of x,
-/// and `outputs` those of f(x). Computed by central differences D(h) with (+) and (-) and one
+/// Returns d f / d x, row-major, in the tangent spaces of x and f(x). `inputs` are the spaces of x.
+/// `outputs` are the spaces of f(x). The Jacobian is computed by central differences D(h) and one
 /// Richardson step, (4 D(h/2) - D(h)) / 3. The error is of order h^4 f'''''.
 template <class F>
 std::vector<double> NumericJacobian(const std::vector<Space>& inputs, const Blocks& x,
@@ -81,8 +82,8 @@ std::vector<double> NumericJacobian(const std::vector<Space>& inputs, const Bloc
   return j;
 }
 
-/// Returns memory for an output. All elements are NaN, so a test detects elements that a model does
-/// not write.
+/// Returns memory for an output. All elements are NaN, so that a test detects elements that a model
+/// does not write.
 inline std::vector<double> UnwrittenOutput(int size) {
   return std::vector<double>(static_cast<std::size_t>(size),
                              std::numeric_limits<double>::quiet_NaN());
@@ -109,7 +110,7 @@ inline std::vector<double> SensorJacobian(const SharedSensor& sensor, const Bloc
 }
 
 /// Returns the Jacobian of h, computed by numeric differentiation. ContractViolation if h is not
-/// defined at the roles or up to 1e-3 away.
+/// defined at all points within 1e-3 of the roles.
 inline std::vector<double> NumericSensorJacobian(const SharedSensor& sensor, const Blocks& roles,
                                                  const double* known = nullptr) {
   const auto predict = [&](const Blocks& x) {
@@ -129,8 +130,8 @@ struct StepResult {
 };
 
 /// Returns x' and the Jacobians that the model computes for a step from x. u is the control input,
-/// or null if the model has no control input. A null w means w = 0. ContractViolation if the step
-/// is not defined.
+/// or null if the model has no control input. A null pointer w means that w is 0. ContractViolation
+/// if the step is not defined.
 inline StepResult StepWithJacobians(const SharedMotion& motion, const Blocks& x, const double* u,
                                     const double* w, double dt_s) {
   const int n = motion->tangent_size();
@@ -143,8 +144,9 @@ inline StepResult StepWithJacobians(const SharedMotion& motion, const Blocks& x,
   return result;
 }
 
-/// Does the same as StepWithJacobians, but computes the Jacobians by numeric differentiation.
-/// ContractViolation if the step is not defined at x and w or up to 1e-3 away.
+/// Returns the same result as StepWithJacobians, but computes the Jacobians by numeric
+/// differentiation. ContractViolation if the step is not defined at all points within 1e-3 of x and
+/// w.
 inline StepResult NumericStep(const SharedMotion& motion, const Blocks& x, const double* u,
                               const double* w, double dt_s) {
   Space noise;

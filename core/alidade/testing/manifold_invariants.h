@@ -13,8 +13,8 @@
 /// GoogleTest assertion for geometries. No other header of alidade includes GoogleTest.
 namespace alidade::testing {
 
-/// Checks that each invariant of a manifold holds to `tolerance`, for its points x and y and the
-/// step d. The failure message names the first invariant that does not hold.
+/// Checks that each invariant of a manifold holds within `tolerance`, for the points x and y and
+/// the step d. The failure message names the first invariant that does not hold.
 ///
 ///   (1)  x (+) 0 = x
 ///   (2)  (x (+) d) (-) x = d      (for rotations only if |d| < pi)
@@ -52,10 +52,10 @@ inline ::testing::AssertionResult ManifoldInvariantsHold(const Geometry& geometr
               {"(3) x (+) (y (-) x) = y", distance(minus(plus(minus(y, x)), y), zero)},
               {"(4) x (+) d is a point of the manifold", DistanceFrom(geometry, moved.data())}};
   for (const auto& [law, defect] : laws) {
-    if (defect <= tolerance) continue;  // a defect that is NaN fails
+    if (defect <= tolerance) continue;  // false if the defect is NaN, which is a failure
     return ::testing::AssertionFailure()
-           << law << " does not hold for " << ToString(geometry) << ": off by " << defect
-           << ", more than " << tolerance << "; x = " << ::testing::PrintToString(x)
+           << law << " does not hold for " << ToString(geometry) << ": the error is " << defect
+           << "; expected at most " << tolerance << "; x = " << ::testing::PrintToString(x)
            << ", d = " << ::testing::PrintToString(d) << ", y = " << ::testing::PrintToString(y);
   }
   return ::testing::AssertionSuccess();

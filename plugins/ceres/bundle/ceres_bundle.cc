@@ -37,9 +37,9 @@ class ProgressCallback : public ceres::IterationCallback {
   const BundleOptions& options_;
 };
 
-/// Ceres problem of a bundle. A parameter block is the pose of a camera, the intrinsics, or a
-/// point. The block of a camera also contains its intrinsics if they are free and no two cameras
-/// share intrinsics. The problem contains only the blocks that an observation uses.
+/// Ceres problem of a bundle adjustment. A parameter block is the pose of a camera, the intrinsics,
+/// or a point. The block of a camera also contains its intrinsics if they are free and no two
+/// cameras share intrinsics. The problem contains only the blocks that an observation uses.
 class Bundle {
  public:
   Bundle(const SensorModel& sensor, const BundleProblem& problem, const BundleOptions& options)
@@ -159,15 +159,15 @@ class Bundle {
   const BundleProblem& problem_data_;
   const BundleOptions& options_;
   Geometry lens_;
-  std::vector<bool> fixed_;            ///< by element of the intrinsics: true if it is constant
+  std::vector<bool> fixed_;            ///< true for each constant element of the intrinsics
   bool lens_in_camera_block_ = false;  ///< true if the block of a camera contains its intrinsics
   std::vector<double> cameras_, lenses_, points_;
-  std::map<std::vector<double>, std::unique_ptr<CostKind<SensorModel>>> kinds_;  ///< by W
+  std::map<std::vector<double>, std::unique_ptr<CostKind<SensorModel>>> kinds_;  ///< key: W
   ceres::Problem ceres_problem_;
 };
 
-/// Eliminates the points first, or the cameras if they have more unknowns. Both are valid, because
-/// a residual depends on one camera and one point.
+/// Eliminates the points first, or the cameras if the cameras have more unknowns. Both orders are
+/// valid, because a residual depends on one camera and one point.
 void Bundle::Eliminate(ceres::Solver::Options& options) {
   int cameras = 0, points = 0;
   const auto count = [&](const double* block, int& sum) {
@@ -188,14 +188,15 @@ void Bundle::Eliminate(ceres::Solver::Options& options) {
     add(camera(i), points_first ? 1 : 0);
   for (int i = 0; i < static_cast<int>(problem_data_.intrinsics.size()); ++i) add(lens(i), 1);
   options.linear_solver_ordering = ordering;
-  constexpr int kDense = 1000;  // most unknowns after elimination for a dense solver
+  constexpr int kDense = 1000;  // maximum number of unknowns for a dense solver
   options.linear_solver_type =
       std::min(cameras, points) <= kDense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
 }
 
-/// Ceres compares a step with the norm of all unknowns, so one very distant point would make every
-/// step pass. The tolerance is therefore scaled to the norm that the points would have if every
-/// coordinate had the median size. The problem has at least one point.
+/// Returns the relative tolerance of a step. Ceres compares the step with the norm of all unknowns.
+/// With a very distant point, every step would be small enough to end the solve. The tolerance is
+/// therefore scaled to the norm that the points would have if every coordinate had the median size.
+/// The problem has at least one point.
 double Bundle::StepTolerance() const {
   constexpr double kTolerance = 1e-12;
   std::vector<double> sizes;

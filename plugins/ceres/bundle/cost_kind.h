@@ -85,7 +85,7 @@ struct CostKind {
   using Traits = detail::SensorTraits<Sensor>;
 
   /// `blocks` are the ambient sizes of the parameter blocks. `whiten` is W: lower triangular,
-  /// row-major, with the tangent size of z. The places of two roles may not overlap. `model` must
+  /// row-major, with the tangent size of z. The places of two roles must not overlap. `model` must
   /// outlive this object.
   CostKind(const Sensor& model, const std::vector<RolePlace>& roles, const std::vector<int>& blocks,
            const std::vector<double>& whiten)
@@ -93,7 +93,7 @@ struct CostKind {
     const std::vector<Geometry> geometries = Traits::Geometries(model);
     const auto m = static_cast<std::size_t>(measured().tangent);
     ALIDADE_EXPECTS(roles.size() == geometries.size() && w.size() == m * m);
-    std::vector<std::vector<bool>> bound, written;  // elements of each block
+    std::vector<std::vector<bool>> bound, written;  // flag of each element of each block
     for (const int size : blocks) bound.emplace_back(static_cast<std::size_t>(size), false);
     written = bound;
     role_count_ = static_cast<int>(roles.size());
@@ -130,11 +130,11 @@ struct CostKind {
   const Sensor& sensor;
   double scale = 1.0;
   bool isotropic = true;                   ///< true if W = scale I
-  RolePlace places[Traits::kMaxRoles];     ///< place of each role; read by each evaluation
+  RolePlace places[Traits::kMaxRoles];     ///< place of each role
   int strides[Traits::kMaxRoles] = {};     ///< row lengths of the Jacobians of the roles
   std::vector<int> sizes;                  ///< ambient sizes of the blocks
   std::vector<double> w;                   ///< W, row-major
-  std::vector<JacobianElement> unwritten;  ///< elements that no model writes; set to 0
+  std::vector<JacobianElement> unwritten;  ///< Jacobian elements that the model does not write
 
  private:
   /// True if the compiler knows the type of the sensor. role_count() and measured() are then

@@ -15,8 +15,7 @@ namespace alidade::ceres_batch {
 /// or is constant.
 ///
 ///   x (+) d           Geometry::Plus for each part
-///   d(x (+) d)/dd  := [I; 0] for each part: its tangent in the first rows; a constant part has no
-///                     column
+///   d(x (+) d)/dd  := [I; 0] for each part, I of the tangent size; no columns for a constant part
 ///
 /// [I; 0] is not the derivative of the ambient values, which models of alidade do not provide. It
 /// is the counterpart of the Jacobian [J | 0] that a cost writes, with J in the tangent: Ceres
@@ -73,8 +72,8 @@ class GeometryManifold : public ceres::Manifold {
   }
 
  private:
-  /// Sets the elements of j to 0, except for a 1 at (ambient row, tangent column) of each element
-  /// that moves.
+  /// Sets the elements of j to 0. Then sets the element at (ambient row, tangent column) to 1 for
+  /// each element that is not constant.
   void Select(double* j, int row_stride, int column_stride) const {
     std::fill_n(j, ambient_ * tangent_, 0.0);
     int row = 0, column = 0;

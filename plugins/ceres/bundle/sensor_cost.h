@@ -17,8 +17,8 @@ namespace alidade::ceres_batch {
 /// The sign does not affect the cost. With this sign the Jacobian is W H, and equals H if W = I.
 /// The Jacobian with respect to a role is in the tangent of the role, and is padded to the ambient
 /// columns: [J | 0], see GeometryManifold. `Sensor` is SensorModel or the type of a model. Evaluate
-/// returns false if h is not defined, and does not allocate. The object is small, because in a
-/// large problem it is rarely in the cache.
+/// returns false if h is not defined, and does not allocate. The object is small, because the costs
+/// of a large problem do not fit into the cache.
 template <class Sensor>
 class SensorCost final : public ceres::CostFunction {
   using Traits = detail::SensorTraits<Sensor>;
@@ -39,7 +39,7 @@ class SensorCost final : public ceres::CostFunction {
   ALIDADE_SCALAR_LOOPS bool Evaluate(const double* const* blocks, double* residuals,
                                      double** jacobians) const override {
     const double* const z = kind_.measured().ambient <= kInlineSize ? z_.inline_values : z_.pointer;
-    __builtin_prefetch(z);  // because z is read only after h has been computed
+    __builtin_prefetch(z);  // z is read only after h has been computed
     const double* roles[Traits::kMaxRoles];
     double* j[Traits::kMaxRoles];
     Bind(blocks, jacobians, roles, j);
@@ -56,7 +56,8 @@ class SensorCost final : public ceres::CostFunction {
   }
 
  private:
-  /// Sets the pointers to the roles and to the Jacobians with respect to the roles.
+  /// Sets the pointers to the roles and to the Jacobians with respect to the roles. Sets those
+  /// elements of the Jacobians to 0 that the model does not write.
   void Bind(const double* const* blocks, double** jacobians, const double** roles,
             double** j) const {
     for (int i = 0; i < kind_.role_count(); ++i) {
@@ -71,8 +72,8 @@ class SensorCost final : public ceres::CostFunction {
     }
   }
 
-  /// Evaluates the cost if z is not a vector or its noise is correlated. It is not inlined, so that
-  /// Evaluate stays small.
+  /// Evaluates the cost if z is not a vector, or if W is not a multiple of I. This function is not
+  /// inlined, so that Evaluate() remains small.
   [[gnu::noinline]] bool EvaluateGeneral(const double* z, const double* const* roles,
                                          double* const* j, double* residuals,
                                          double** jacobians) const {
@@ -144,8 +145,8 @@ class SensorCost final : public ceres::CostFunction {
   const CostKind<Sensor>& kind_;
   static constexpr int kInlineSize = 3;
   union {
-    double inline_values[kInlineSize];  ///< z, if it has at most kInlineSize numbers
-    const double* pointer;              ///< points to a longer z
+    double inline_values[kInlineSize];  ///< z with at most kInlineSize numbers
+    const double* pointer;              ///< pointer to a longer z
   } z_;
 };
 

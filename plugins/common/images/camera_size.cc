@@ -13,7 +13,7 @@ std::string SizeText(cv::Size size) {
 
 CameraSize::CameraSize(const SourceArguments& arguments, const Source& source) {
   if (arguments.config == nullptr) return;
-  const Config config = arguments.config->Copy();  // a copy: keys of the original stay unread
+  const Config config = arguments.config->Copy();  // copied: the keys of the original remain unread
   const Node root = config.root();
   const auto use = root.At("source").Find("calibration");
   std::optional<Config> calibration;
@@ -31,12 +31,13 @@ CameraSize::CameraSize(const SourceArguments& arguments, const Source& source) {
 void CameraSize::Check(cv::Size found, const Place& image) const {
   for (const Camera& camera : cameras_) {
     if (Matches(camera.width, found.width) && Matches(camera.height, found.height)) continue;
-    throw Error(ExitCode::kBadData,
-                ErrorLine(image, {},
-                          SizeText(found) + ", but the camera of " + camera.place + " is " +
-                              SideText(camera.width) + "x" + SideText(camera.height) + " px",
-                          "images of that camera, or a 'camera' with the width and height of these "
-                          "images, and with fx, fy, cx, cy in their pixels"));
+    throw Error(
+        ExitCode::kBadData,
+        ErrorLine(image, {},
+                  "the image has " + SizeText(found) + ", but the camera of " + camera.place +
+                      " has " + SideText(camera.width) + "x" + SideText(camera.height) + " px",
+                  "images of this camera, or a section 'camera' with the width and height "
+                  "of these images, and with fx, fy, cx, cy in pixels of these images"));
   }
 }
 

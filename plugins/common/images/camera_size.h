@@ -23,8 +23,8 @@ class CameraSize {
   CameraSize() = default;
   CameraSize(const SourceArguments& arguments, const Source& source);
 
-  /// Checks the size of an image. Error: kBadData if `found` is another size, because the image is
-  /// then from another camera.
+  /// Checks the size of an image. Error: kBadData if `found` is a different size, because the image
+  /// is then from another camera.
   void Check(cv::Size found, const Place& image) const;
 
  private:
@@ -38,7 +38,7 @@ class CameraSize {
 
   static std::vector<Node> SensorsOn(const std::vector<StreamInfo>& streams, const Node& root);
 
-  /// Reads the width and the height, each from the first map that contains it.
+  /// Reads the width and the height. Each key is read from the first map that contains it.
   void Read(const std::vector<Node>& maps);
 
   std::vector<Camera> cameras_;

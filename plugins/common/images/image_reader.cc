@@ -28,7 +28,8 @@ ImageReader::ImageReader(std::filesystem::path path, const std::string& names, c
   }
   is_live_ = std::filesystem::is_character_file(path_, error);
   if (!is_live_ && !std::filesystem::is_regular_file(path_, error)) {
-    throw Error(ExitCode::kBadData, ErrorLine({path_.string()}, {}, "not a file",  // such as a pipe
+    throw Error(ExitCode::kBadData, ErrorLine({path_.string()}, {},
+                                              "this is not a regular file",  // such as a pipe
                                               "a video, a folder of images, or a camera"));
   }
   if (is_live_ ? video_.open(path_.string(), cv::CAP_V4L2) : video_.open(path_.string())) return;
@@ -36,7 +37,7 @@ ImageReader::ImageReader(std::filesystem::path path, const std::string& names, c
       ExitCode::kBadData,
       ErrorLine({path_.string()}, {},
                 is_live_ ? "OpenCV cannot read this camera, or another program uses the camera"
-                         : "not a video that OpenCV reads",
+                         : "OpenCV cannot read this file as a video",
                 "a video, a folder of images, or a camera such as /dev/video0"));
 }
 
@@ -45,8 +46,8 @@ bool ImageReader::Next(cv::Mat& image) {
   ++number_;
   if (size_.empty()) size_ = image.size();
   if (image.size() != size_) {
-    Fail(SizeText(image.size()) + ", but the first image is " + SizeText(size_),
-         "images of one size");
+    Fail("the image has " + SizeText(image.size()) + ", but the first image has " + SizeText(size_),
+         "images of the same size");
   }
   return true;
 }
@@ -91,11 +92,11 @@ void ImageReader::List(const std::string& names, const Node& key) {
                 ErrorLine(key.place(), key.path(), path_.string() + ": " + error.message()));
   }
   if (!files_.empty()) return;
-  throw Error(
-      ExitCode::kInputMissing,
-      ErrorLine(key.place(), key.path(),
-                "no image in " + path_.string() + (names.empty() ? "" : " matches '" + names + "'"),
-                "PNG, JPEG, PGM or another format that OpenCV reads"));
+  throw Error(ExitCode::kInputMissing,
+              ErrorLine(key.place(), key.path(),
+                        "no image in " + path_.string() +
+                            (names.empty() ? " was found" : " matches '" + names + "'"),
+                        "PNG, JPEG, PGM or another format that OpenCV reads"));
 }
 
 bool ImageReader::ReadVideo(cv::Mat& image) {
@@ -128,9 +129,9 @@ bool ImageReader::ReadFile(cv::Mat& image) {
   if (bytes.empty() || is_cut) image.release();
   if (image.empty()) {
     ++number_;
-    Fail(bytes.empty() ? "an empty file"
-         : is_cut      ? "the image is cut short"
-                       : "not an image that OpenCV reads",
+    Fail(bytes.empty() ? "the file is empty"
+         : is_cut      ? "the image file is incomplete"
+                       : "OpenCV cannot read this file as an image",
          "a complete image, or a pattern `images` that excludes this file");
   }
   return true;

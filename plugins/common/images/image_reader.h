@@ -17,12 +17,13 @@ namespace alidade {
 /// folder are read in the order of their names (2.png before 10.png). A camera is a device such as
 /// /dev/video0.
 ///
-/// Errors       kInputMissing: no such path, or no image in the folder. kBadData, with the file: an
-///              image that cannot be decoded, is cut short, or has another size than the first.
+/// Errors       kInputMissing if the path does not exist, or the folder has no images. kBadData,
+///              with the file, if an image cannot be decoded, is incomplete, or does not have the
+///              size of the first image.
 class ImageReader {
  public:
-  /// `names` is a shell pattern of the image files in a folder. If it is empty, the endings of the
-  /// names determine which files are images.
+  /// `names` is a shell pattern of the image files in a folder. If `names` is empty, the endings of
+  /// the file names determine which files are images.
   ImageReader(std::filesystem::path path, const std::string& names, const Node& key);
 
   /// Reads the next image. Returns false at the end.
@@ -33,7 +34,7 @@ class ImageReader {
   bool is_live() const { return is_live_; }
   /// Returns the number of the last image, counted from 0.
   std::int64_t number() const { return number_; }
-  /// Returns the file of the last image, or its number in the video.
+  /// Returns the place of the last image: its file, or the video and the number of the image.
   Place place() const;
   /// Returns the file name of image k; "" for a video.
   std::string name(std::int64_t k) const;
@@ -53,8 +54,9 @@ class ImageReader {
 
   bool ReadFile(cv::Mat& image);
 
-  /// Returns true if the end of a PNG or JPEG file is missing. The JPEG decoder replaces missing
-  /// data without an error, and the PNG decoder prints a line of its own on stderr.
+  /// Returns true if the end of a PNG or JPEG file is missing. This function is needed because the
+  /// JPEG decoder replaces missing data without an error, and the PNG decoder prints a message on
+  /// stderr.
   static bool IsCutShort(std::string_view bytes);
 
   [[noreturn]] void Fail(const std::string& what, std::string_view expected) const;

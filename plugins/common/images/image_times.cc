@@ -50,7 +50,7 @@ void ImageTimes::Check(const ImageReader& images, std::int64_t first,
       max_count > 0 ? std::min(images.size(), first + max_count) : images.size();
   for (std::int64_t k = first; k < end; ++k) {
     const Row& row = RowOf(k, images.name(k));
-    if (k == first || by_name_.empty()) continue;  // times by number were checked on reading
+    if (k == first || by_name_.empty()) continue;  // a numbered table was checked on reading
     const Row& previous = RowOf(k - 1, images.name(k - 1));
     if (row.t > previous.t) continue;
     Fail(row.line,
@@ -70,8 +70,8 @@ Timestamp ImageTimes::At(std::int64_t number, const std::string& name) {
 void ImageTimes::End(std::int64_t count) const {
   const auto surplus = by_number_.lower_bound(count);
   if (surplus == by_number_.end()) return;
-  Fail(surplus->second.line, "a time for image " + std::to_string(surplus->first) +
-                                 ", but there are " + std::to_string(count) +
+  Fail(surplus->second.line, "there is a time for image " + std::to_string(surplus->first) +
+                                 ", but the source has " + std::to_string(count) +
                                  " images, counted from 0");
 }
 
@@ -87,7 +87,8 @@ void ImageTimes::ReadNamed(NumberRows&& rows, bool in_ns) {
     }
   }
   if (by_name_.empty())
-    rows.FailLine("no rows", "a row `" + std::string(columns) + "` for each image");
+    rows.FailLine("the file contains no rows",
+                  "a row `" + std::string(columns) + "` for each image");
 }
 
 void ImageTimes::ReadPlain(NumberRows&& rows) {
@@ -102,19 +103,19 @@ void ImageTimes::ReadPlain(NumberRows&& rows) {
     }
     by_number_.emplace_hint(by_number_.end(), std::ssize(by_number_), Row{t, rows.line()});
   }
-  if (by_number_.empty()) rows.FailLine("no rows", "a row `t_s` for each image");
+  if (by_number_.empty()) rows.FailLine("the file contains no rows", "a row `t_s` for each image");
 }
 
 const ImageTimes::Row& ImageTimes::RowOf(std::int64_t number, const std::string& name) const {
   if (!by_name_.empty()) {
     const auto found = by_name_.find(name);
-    if (found == by_name_.end()) Fail(0, "no time for image " + name);
+    if (found == by_name_.end()) Fail(0, "there is no time for image " + name);
     return found->second;
   }
   const auto found = by_number_.lower_bound(number);
   if (found != by_number_.end() && found->first == number) return found->second;
   const auto nearest = found == by_number_.end() ? std::prev(found) : found;
-  Fail(nearest->second.line, "no time for image " + std::to_string(number));
+  Fail(nearest->second.line, "there is no time for image " + std::to_string(number));
 }
 
 Timestamp ImageTimes::ElapsedTime() {

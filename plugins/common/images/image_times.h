@@ -15,28 +15,30 @@
 
 namespace alidade {
 
-/// Times of images: from a table `frame,t_s`, from a table of file names, at a constant rate, or
-/// from the clock. A table is read as a whole, before the first image.
+/// Provides the times of images, which are read from a table `frame,t_s`, from a table of file
+/// names, or from the clock, or follow from a constant rate. A table is read completely before the
+/// first image.
 ///
 /// Errors       kBadData with file and line, if an image has no time, if times do not increase, or
-///              if a table by number has a time without an image. If an image were missing, all
-///              later images would have wrong times.
+///              if a table of numbered images has a time without an image. The last case indicates
+///              a missing image, after which all images would have wrong times.
 class ImageTimes {
  public:
-  /// Creates times for a live camera: read from the clock, counted from the first image.
+  /// Creates the times of a live camera. The clock provides these times, and the first image has
+  /// the time 0.
   ImageTimes() = default;
   explicit ImageTimes(double rate_hz) : rate_hz_(rate_hz) {}
   ImageTimes(const std::filesystem::path& table, const Node& key);
 
-  /// Returns the times in the table of a folder of images, or nullopt if it has none of these
-  /// tables:
+  /// Returns the times of the images in `folder`, read from the first of these tables that exists.
+  /// Returns nullopt if there is no such table:
   ///
-  ///   FOLDER/timestamps.csv    frame,t_s      counted from 0
+  ///   FOLDER/timestamps.csv    frame,t_s      frames counted from 0
   ///   FOLDER/../data.csv       t_ns,name      EuRoC: mav0/cam0/data
   ///   FOLDER/../FOLDER.txt     t_s name       TUM: rgb and rgb.txt
   ///   FOLDER/../times.txt      t_s            KITTI: image_0, a row for each image
   ///
-  /// Without `by_layout` only the first table is read.
+  /// If `by_layout` is false, only timestamps.csv is considered.
   static std::optional<ImageTimes> FindNextTo(const std::filesystem::path& folder, bool by_layout,
                                               const Node& key);
 
@@ -46,8 +48,8 @@ class ImageTimes {
   void Check(const ImageReader& images, std::int64_t first, std::int64_t max_count) const;
   /// Returns the time of image `number`, counted from 0, with the file name `name`.
   Timestamp At(std::int64_t number, const std::string& name);
-  /// Checks that the table has no time for an image with a number of `count` or more. `count` is
-  /// the number of images, which is known after the last one.
+  /// Checks that the table has no time for an image that does not exist. `count` is the number of
+  /// images, which is known after the last image.
   void End(std::int64_t count) const;
 
  private:

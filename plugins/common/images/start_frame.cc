@@ -6,7 +6,7 @@
 namespace alidade {
 
 StartFrame::StartFrame(Params& p, const Node& entry)
-    : number_(p.Integer("start_frame", "images before this one are skipped", 0, 1 << 30, 0)) {
+    : number_(p.Integer("start_frame", "first image; earlier images are skipped", 0, 1 << 30, 0)) {
   if (const auto node = entry.Find("start_frame")) {
     place_ = node->place();
     path_ = node->path();
@@ -18,8 +18,8 @@ void StartFrame::Check(std::int64_t count) const {
   const std::string images = count == 1 ? " image" : " images";
   throw Error(ExitCode::kBadConfig,
               ErrorLine(place_, path_,
-                        std::to_string(number_) + ", but there are " + std::to_string(count) +
-                            images + ", counted from 0",
+                        "image " + std::to_string(number_) + " does not exist; the source has " +
+                            std::to_string(count) + images + ", counted from 0",
                         "at most " + std::to_string(std::max<std::int64_t>(0, count - 1))));
 }
 

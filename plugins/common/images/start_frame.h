@@ -11,7 +11,8 @@
 
 namespace alidade {
 
-/// Key `start_frame` of a source of images. The images before it are skipped.
+/// Key `start_frame` of a source of images: the number of the first image. Earlier images are
+/// skipped.
 class StartFrame {
  public:
   StartFrame(Params& p, const Node& entry);

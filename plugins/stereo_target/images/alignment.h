@@ -29,12 +29,13 @@ inline cv::Point2d Apply(const cv::Matx33d& warp, cv::Point2d point) {
 inline cv::Point2d Middle(const cv::Mat& patch) {
   return {0.5 * (patch.cols - 1), 0.5 * (patch.rows - 1)};
 }
-/// Returns half the longer side of a patch, px. This is the unit of length of small changes.
+/// Returns half the longer side of a patch, px. Small changes have this unit of length.
 inline double HalfSide(const cv::Mat& patch) { return 0.5 * std::max(patch.cols, patch.rows); }
 
-/// Returns warp U (I + sum_i d_i E_i) U^-1: applies small changes d to the patch. Its coordinates
-/// are 0 in the middle of the patch and 1 at the edge. U converts these coordinates to pixels. E_0
-/// to E_7 are size, turn, shift right, shift down, stretch, shear, and the two projective changes.
+/// Returns warp U (I + sum_i d_i E_i) U^-1: the warp after small changes d of the patch. The
+/// changes are expressed in coordinates that are 0 in the middle of the patch and 1 at its edge. U
+/// converts these coordinates to pixels. E_0 to E_7 are size, turn, shift right, shift down,
+/// stretch, shear, and the two projective changes.
 inline cv::Matx33d ApplyChange(const cv::Matx33d& warp, const cv::Mat& patch,
                                const Eigen::Ref<const Eigen::VectorXd>& d) {
   std::array<double, 8> values{};
@@ -75,11 +76,11 @@ inline double AreaScaleAt(const cv::Matx33d& warp, cv::Point2d point) {
 
 /// Patch that was found in an image.
 struct Alignment {
-  cv::Matx33d warp;            ///< pixels of the patch to pixels of the image
+  cv::Matx33d warp;            ///< warp from the patch to the image, px
   double similarity;           ///< correlation of patch and image, in [-1, 1]
   Eigen::MatrixXd covariance;  ///< covariance of d, see ApplyChange()
 
-  /// Returns the variance of a function of the warp: g C g'. The gradient g is computed by
+  /// Returns the variance of a function of the warp: g C g'. The gradient g is computed by central
   /// differences.
   double Variance(const cv::Mat& patch,
                   const std::function<double(const cv::Matx33d&)>& function) const {
@@ -95,12 +96,12 @@ struct Alignment {
   }
 };
 
-/// Alignment of one patch in one image [Baker2004], both grey as float:
+/// Alignment of one patch in one image [Baker2004]. Both have grey values of type float:
 ///
 ///   patch(x) = a (sampled(x; warp) + J d) + b + e,   J = d sampled / d d
 ///
-/// The equation is solved for the change d of the warp and the light (a, b) by weighted least
-/// squares, until d is small. (If a and b were applied to the patch, a = 0 would fit any uniform
+/// Weighted least squares determine the change d of the warp and the light (a, b). This step is
+/// repeated until d is small. (If a and b were applied to the patch, a = 0 would fit any uniform
 /// area.) Huber's loss reduces the weight of pixels with a large e, such as those of objects in
 /// front of the target.
 class PatchAlignment {
@@ -108,8 +109,9 @@ class PatchAlignment {
   PatchAlignment(const cv::Mat& patch, const cv::Mat& image, Warp kind)
       : patch_(patch), image_(image), count_(ParameterCount(kind)) {}
 
-  /// Aligns the patch, from the given `warp` on. Returns false if the alignment does not converge,
-  /// if less than half of the patch is in the image, or if the patch has no texture.
+  /// Aligns the patch, starting from `warp`. Stores the result in `warp`. Returns false if the
+  /// alignment does not converge, if less than half of the patch is in the image, or if the patch
+  /// has no texture.
   bool Run(cv::Matx33d& warp) {
     constexpr int kMaxSteps = 40;
     constexpr double kSettled = 2e-3, kAlmostSettled = 5e-2, kMaxStep = 0.25;  // px, px, half sides
@@ -126,8 +128,8 @@ class PatchAlignment {
   }
 
   /// Returns the alignment after Run(), with the covariance C = s^2 c (a J' W J a)^-1. s^2 is the
-  /// variance of e. c accounts for correlated errors, which average out less: it is the product of
-  /// (1 + q) / (1 - q) for rows and columns, with the correlation q of neighbours in e.
+  /// variance of e. c accounts for the correlation of neighbouring errors: it is the product of (1
+  /// + q) / (1 - q) for rows and for columns. q is the correlation of neighbouring values of e.
   Alignment Result(const cv::Matx33d& warp) const {
     double squares = 0.0, weights = 0.0, along_rows = 0.0, along_columns = 0.0;
     for (int y = 1; y < patch_.rows - 1; ++y) {
@@ -168,8 +170,8 @@ class PatchAlignment {
     return std::abs(error) <= kHuber * spread_ ? 1.0 : kHuber * spread_ / std::abs(error);
   }
 
-  /// Samples the image at each pixel of the patch. cv::warpPerspective rounds positions to 1/32 px,
-  /// which prevents convergence.
+  /// Samples the image at each pixel of the patch. Does not use cv::warpPerspective, because this
+  /// function rounds positions to 1/32 px, which prevents convergence.
   void Sample(const cv::Matx33d& warp) {
     sampled_.create(patch_.size(), CV_32F);
     const int last_column = image_.cols - 2, last_row = image_.rows - 2;
@@ -273,18 +275,18 @@ class PatchAlignment {
   const cv::Mat& patch_;
   const cv::Mat& image_;
   int count_;
-  cv::Mat sampled_, right_, down_;  ///< image at the pixels of the patch; its gradient
-  Eigen::VectorXd solution_;        ///< a d, then a and b
+  cv::Mat sampled_, right_, down_;  ///< image at the pixels of the patch, and its gradient
+  Eigen::VectorXd solution_;        ///< a d, followed by a and b
   double spread_ = 1.0;             ///< standard deviation of e, in grey levels
   Eigen::LDLT<Eigen::MatrixXd> solver_;
   std::vector<double> errors_;
 };
 
-/// Finds `patch` in `image` to a fraction of a pixel, starting from `warp`. Both are grey as float.
-/// Brightness and contrast may change. If the alignment does not converge, or the similarity is
-/// low, patch and image are first aligned at a quarter of their size. This alignment converges from
-/// farther away; the full-size alignment is then repeated from its result. Returns nullopt if
-/// PatchAlignment::Run() fails for both starts.
+/// Finds `patch` in `image` to a fraction of a pixel, starting from `warp`. Both have grey values
+/// of type float. Brightness and contrast may change. If the alignment does not converge, or the
+/// similarity is low, patch and image are first aligned at a quarter of their size. This alignment
+/// converges from a larger distance. The full-size alignment is then repeated from the result of
+/// the small one. Returns nullopt if PatchAlignment::Run() fails for both starts.
 inline std::optional<Alignment> Align(const cv::Mat& patch, const cv::Mat& image,
                                       const cv::Matx33d& warp, Warp kind) {
   constexpr int kShrink = 4, kMinSide = 16;

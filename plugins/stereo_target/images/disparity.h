@@ -15,19 +15,19 @@ namespace alidade {
 /// Requirements for a disparity.
 struct DisparityOptions {
   double max_px;          ///< largest disparity of the search
-  double min_similarity;  ///< minimum correlation of both images of the target
-  double min_distinct;    ///< minimum lead of the best correlation over the second best
+  double min_similarity;  ///< minimum correlation of the target between both images
+  double min_distinct;    ///< minimum difference of the best and the next best correlation
   double max_row_px;      ///< maximum difference of the rows of the target
   double max_sigma_px;    ///< maximum standard deviation of a disparity
 
   explicit DisparityOptions(Params& p)
       : max_px(p.NonNegative("disparity.max_px", "px",
-                             "largest disparity of the search: nearer targets have no disparity; "
-                             "0: the whole image",
+                             "largest disparity of the search; nearer targets have no disparity; "
+                             "0: search the whole image",
                              0.0)),
         min_similarity(p.Number("disparity.min_similarity", "1",
-                                "minimum correlation of the target in both images", {-1.0, 1.0},
-                                0.8)),
+                                "minimum correlation of the target between both images",
+                                {-1.0, 1.0}, 0.8)),
         min_distinct(p.Number("disparity.min_distinct", "1",
                               "minimum difference of the best and the next best correlation",
                               {0.0, 2.0}, 0.02)),

@@ -34,21 +34,22 @@ class ImageTarget : public Source {
         start_(arguments.params, arguments.entry) {
     Params& p = arguments.params;
     const Node& entry = arguments.entry;
-    rate_hz_ = p.Number("rate_hz", "Hz", "images per second; 0: from `timestamps` or the video",
-                        {0.0, 1e6}, 0.0);
+    rate_hz_ =
+        p.Number("rate_hz", "Hz", "images per second; 0: defined by `timestamps` or the video",
+                 {0.0, 1e6}, 0.0);
     max_frames_ = p.Integer("max_frames", "maximum number of images; 0: all", 0, 1 << 30, 0);
     tolerance_ = TimestampFromSeconds(p.Number(
-        "truth_tolerance_s", "s", "maximum time difference of a true value", {0.0, 1e3}, 1e-3));
+        "truth_tolerance_s", "s", "maximum time from an image to a true value", {0.0, 1e3}, 1e-3));
     sigma_systematic_px_ =
         p.NonNegative("sigma_systematic_px", "px",
-                      "systematic error not visible in the residuals, of the disparity "
-                      "and of an edge of the target, 1 sigma",
+                      "systematic error of the disparity and of an edge of the target, which "
+                      "the residuals do not contain, 1 sigma",
                       0.1);
     estimate_noise_ =
         p.Flag("estimate_noise",
-               "each measurement has its own variance; false: the variance of the sensor", true);
+               "true: each measurement has its own variance; false: that of the sensor", true);
     const std::array<double, 4> box = p.Vector<4>(
-        "target", "px", "[x, y, width, height] of the target in image start_frame; or `boxes`",
+        "target", "px", "[x, y, width, height] of the target in image start_frame; or use `boxes`",
         kNonNegative, std::array<double, 4>{});
     for (const char* key : {"left", "right", "stereo", "boxes", "timestamps", "truth"}) {
       entry.Declare(key);
@@ -59,10 +60,11 @@ class ImageTarget : public Source {
     times_->Check(*left_, start_.number(), max_frames_);
     const bool has_target = entry.Find("target").has_value();
     if (has_target && !(box[2] >= 8.0 && box[3] >= 8.0)) {
-      entry.At("target").Fail("less than 8 px wide or high", "[x, y, width, height], px");
+      entry.At("target").Fail("the target is less than 8 px wide or high",
+                              "[x, y, width, height], px");
     }
     if (!has_target && !boxes_) {
-      entry.Fail("neither 'target' nor 'boxes'",
+      entry.Fail("neither 'target' nor 'boxes' is given",
                  "target: [x, y, width, height], px, in the first image");
     }
     if (has_target) target_corners_ = BoxRows::FromBox(box[0], box[1], box[2], box[3]);
@@ -70,12 +72,12 @@ class ImageTarget : public Source {
     if (options_.warp == Warp::kHomography && !entry.Find("stereo")) {
       const Camera camera(p);
       if (camera.model != CameraModel::kPinhole) {
-        p.Fail("camera.model", "not 'pinhole', but the images must have no distortion");
+        p.Fail("camera.model", "must be 'pinhole', because the images must have no distortion");
       }
       intrinsics = cv::Matx33d(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
     }
     if (const auto stereo = entry.Find("stereo")) {
-      if (!right_) stereo->Fail("needs 'right'", "the images of both cameras");
+      if (!right_) stereo->Fail("this key needs the key 'right'", "the images of both cameras");
       stereo_file_ = folder_ / stereo->Text();
       ReadPair();
       has_read_ = true;
@@ -134,7 +136,7 @@ class ImageTarget : public Source {
   std::optional<std::filesystem::path> Find(const Node& entry, const char* key) const {
     const auto node = entry.Find(key);
     if (!node) return std::nullopt;
-    if (node->Text().empty()) node->Fail("no path");
+    if (node->Text().empty()) node->Fail("the path is empty");
     return folder_ / node->Text();
   }
 
@@ -151,8 +153,8 @@ class ImageTarget : public Source {
     open("left", left_);
     open("right", right_);
     if (right_ && !right_->is_video() && !left_->is_video() && right_->size() != left_->size()) {
-      entry.At("right").Fail(std::to_string(right_->size()) + " images, but 'left' has " +
-                                 std::to_string(left_->size()),
+      entry.At("right").Fail("'right' has " + std::to_string(right_->size()) +
+                                 " images, but 'left' has " + std::to_string(left_->size()),
                              "a right image for each left image");
     }
     const auto table = [&](const char* key, auto& rows) {
@@ -168,7 +170,9 @@ class ImageTarget : public Source {
       times_.emplace(*table_of_times, entry.At("timestamps"));
     } else {
       if (rate_hz_ == 0.0) rate_hz_ = left_->rate_hz();
-      if (!(rate_hz_ > 0.0)) entry.Fail("no 'timestamps'", "that table, or 'rate_hz'");
+      if (!(rate_hz_ > 0.0)) {
+        entry.Fail("the times of the images are not defined", "'timestamps' or 'rate_hz'");
+      }
       times_.emplace(rate_hz_);
     }
   }
@@ -187,7 +191,7 @@ class ImageTarget : public Source {
       times_->End(left_->number() + 1);
       if (!has_started_) {
         throw Error(ExitCode::kBadData,
-                    ErrorLine(place(), {}, "no image showed the target",
+                    ErrorLine(place(), {}, "no image shows the target",
                               "a row of 'boxes' for an image that shows the target"));
       }
       return false;
@@ -202,7 +206,7 @@ class ImageTarget : public Source {
       throw Error(ExitCode::kBadData,
                   ErrorLine(right_->place(), {},
                             "the size of the right image differs from that of the left image",
-                            "images of one size"));
+                            "images of the same size"));
     }
     return true;
   }
@@ -218,7 +222,7 @@ class ImageTarget : public Source {
     }
     if (corners && !has_started_ && !IsInImage(*corners)) {
       throw Error(ExitCode::kBadData, ErrorLine(place(), {}, "the target is not inside this image",
-                                                "'target' or a row of 'boxes' inside the image"));
+                                                "a box inside the image, in 'target' or 'boxes'"));
     }
     const auto tracked = tracker_->Track(image_[0], corners);
     if (!tracked && !has_started_ && !boxes_) {

@@ -15,16 +15,16 @@ namespace alidade {
 ///
 /// Each measurement has its own variance, unless `estimate_noise` is false:
 ///
-///   of d            var(d) + sigma^2
-///   of s            var(s) + (2 sigma s / w)^2,   w = sqrt(width height) of the target, px
+///   variance of d   var(d) + sigma^2
+///   variance of s   var(s) + (2 sigma s / w)^2,   w = sqrt(width height) of the target, px
 ///
 /// sigma is sigma_systematic_px of the config. It covers errors of calibration, interpolation and
 /// the target itself that are not visible in the residuals. var() is the variance of the alignment.
-/// All values of s that are measured with one template share the error of this template. No filter
-/// here models this correlation.
+/// All values of s that are measured with one template share the error of this template. The
+/// filters of alidade do not model this correlation.
 ///
-/// If the target is lost, hidden or black, there is no measurement. The target is then searched for
-/// in each image.
+/// If the target is lost, hidden or black, there is no measurement. The source then searches for
+/// the target in each image.
 ///
 /// Errors       those of ImageReader, TimestampRows, BoxRows, TruthRows, Rectification; kBadConfig.
 std::unique_ptr<Source> CreateImageTarget(const SourceArguments& arguments);

@@ -2,5 +2,5 @@
 #include "alidade/experiment/source_plugin.h"
 #include "image_target.h"
 
-// The source stereo_target in stereo_target.cc opens this plugin, and contains its help texts.
+// The source stereo_target in stereo_target.cc loads this plugin, and contains the help texts.
 ALIDADE_SOURCE_PLUGIN({"image_target", "", "", &alidade::CreateImageTarget})

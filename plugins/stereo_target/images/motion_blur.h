@@ -9,15 +9,15 @@
 
 namespace alidade {
 
-/// Blur of a patch that moves at constant velocity during the exposure. It is the mean along a
-/// segment,
+/// Blur of a patch that moves at constant velocity during the exposure. The blurred patch is the
+/// mean of the patch along a segment:
 ///
 ///   blurred(x) = integral of patch(x + s L e) ds,   s in [-1/2, 1/2],   e = (cos angle, sin angle)
 ///
-/// with L = length * the longer side of the patch.
+/// L is `length` times the longer side of the patch.
 struct MotionBlur {
-  double angle = 0.0;   ///< rad; 0 is to the right, pi/2 down in the patch
-  double length = 0.0;  ///< relative to the longer side of the patch; 0: sharp
+  double angle = 0.0;   ///< direction in the patch, rad; 0: right, pi/2: down
+  double length = 0.0;  ///< relative to the longer side of the patch; 0: no blur
 
   static constexpr double kMaxLength = 0.75;
 
@@ -25,7 +25,7 @@ struct MotionBlur {
   static int Margin(cv::Size size) {
     return cvCeil(0.5 * kMaxLength * std::max(size.width, size.height)) + 1;
   }
-  /// Returns the blurs to try: sharp, and four directions with four lengths.
+  /// Returns the candidates: no blur, and blurs in four directions with four lengths each.
   static std::vector<MotionBlur> Candidates() {
     std::vector<MotionBlur> candidates{{}};
     for (int direction = 0; direction < 4; ++direction) {
@@ -41,8 +41,8 @@ struct MotionBlur {
     return {*this, {angle, length - 1.0 / 12.0}, {angle, length + 1.0 / 12.0}};
   }
 
-  /// Returns the blurred patch of `size`, float. `padded_patch` is the sharp patch with Margin() on
-  /// each side.
+  /// Returns the blurred patch of `size`, with grey values of type float. `padded_patch` is the
+  /// sharp patch with Margin() on each side.
   cv::Mat Apply(const cv::Mat& padded_patch, cv::Size size) const {
     const cv::Rect inner((padded_patch.cols - size.width) / 2,
                          (padded_patch.rows - size.height) / 2, size.width, size.height);
@@ -54,9 +54,9 @@ struct MotionBlur {
     return blurred(inner).clone();
   }
 
-  /// Returns true if this blur fits the motion of the patch since the previous image: `motion`, px
-  /// of the patch. The blur must be along the motion, and 0.4 to 1.4 times as long as the motion. A
-  /// short exposure shortens the blur; an accelerating motion lengthens it.
+  /// Returns true if this blur fits `motion`, the motion of the patch since the previous image, in
+  /// px of the patch. The blur must be along the motion, and 0.4 to 1.4 times as long as the
+  /// motion. A short exposure shortens the blur. An accelerating motion lengthens the blur.
   bool Explains(cv::Point2d motion, cv::Size size) const {
     constexpr double kMinAlignment = 0.8, kMinRatio = 0.4, kMaxRatio = 1.4;
     if (length == 0.0) return true;

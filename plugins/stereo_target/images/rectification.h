@@ -23,7 +23,7 @@ namespace alidade {
 ///   D1, D2              4 to 14     -     k1 k2 p1 p2 [k3 [k4 k5 k6 ...]], in OpenCV's order
 ///   R, T                3x3, 3x1    -, m  right_from_left
 ///
-/// Errors       kInputMissing; kBadData with the file: an entry is missing or has another shape.
+/// Errors       kInputMissing; kBadData with the file, if an entry is missing or has a wrong shape.
 class Rectification {
  public:
   Rectification(const std::filesystem::path& file, const Node& key, cv::Size size) {
@@ -37,7 +37,7 @@ class Rectification {
       const auto read = [&](const char* name) {
         cv::Mat matrix;
         storage[name] >> matrix;
-        if (matrix.empty()) Fail(file, std::string("no matrix '") + name + "'");
+        if (matrix.empty()) Fail(file, std::string("there is no matrix '") + name + "'");
         matrix.convertTo(matrix, CV_64F);
         if (!cv::checkRange(matrix)) Fail(file, std::string("'") + name + "' is not finite");
         return matrix;
@@ -49,12 +49,12 @@ class Rectification {
       r = read("R");
       t = read("T");
       const auto expect = [&](const cv::Mat& matrix, cv::Size shape, const char* name) {
-        if (matrix.size() != shape) Fail(file, std::string("'") + name + "' has another shape");
+        if (matrix.size() != shape) Fail(file, std::string("'") + name + "' has a wrong shape");
       };
       expect(m1, {3, 3}, "M1");
       expect(m2, {3, 3}, "M2");
       expect(r, {3, 3}, "R");
-      if (t.total() != 3) Fail(file, "'T' has another shape");
+      if (t.total() != 3) Fail(file, "'T' has a wrong shape");
       if (!(cv::norm(r * r.t(), cv::Mat::eye(3, 3, CV_64F), cv::NORM_INF) < 1e-3)) {
         Fail(file, "'R' is not a rotation");
       }
@@ -68,7 +68,7 @@ class Rectification {
       intrinsics_ = p1.colRange(0, 3);
       baseline_m_ = -p2.at<double>(0, 3) / p2.at<double>(0, 0);
     } catch (const cv::Exception& error) {
-      Fail(file, "not a calibration that OpenCV reads: " + error.err);
+      Fail(file, "OpenCV cannot read this calibration: " + error.err);
     }
     if (!(baseline_m_ > 0.0)) {
       Fail(file, "the right camera is not to the right of the left camera");
@@ -82,7 +82,7 @@ class Rectification {
     cv::remap(image, rectified, map_[view][0], map_[view][1], cv::INTER_LINEAR);
     return rectified;
   }
-  /// Returns the position in the rectified left image of a pixel of the original left image.
+  /// Converts a pixel of the original left image to its position in the rectified left image.
   cv::Point2f Rectify(cv::Point2f pixel) const {
     std::vector<cv::Point2f> rectified;
     cv::undistortPoints(std::vector<cv::Point2f>{pixel}, rectified, camera_.matrix,
@@ -113,8 +113,8 @@ class Rectification {
  private:
   [[noreturn]] static void Fail(const std::filesystem::path& file, const std::string& problem) {
     throw Error(ExitCode::kBadData, ErrorLine({file.string()}, {}, problem,
-                                              "M1, D1, M2, D2, R and T of cv::stereoCalibrate, T "
-                                              "in m"));
+                                              "M1, D1, M2, D2, R and T of cv::stereoCalibrate, "
+                                              "with T in m"));
   }
 
   struct LeftCamera {

@@ -12,8 +12,8 @@
 #include "target_template.h"
 
 /// Search for a target that cannot be tracked. The templates of the target and the image are
-/// shrunk, and correlated at each position. Some position is always the best, so it only counts if
-/// its correlation is clearly larger than all others.
+/// shrunk, and correlated at each position. One position always has the largest correlation. This
+/// position is a match only if its correlation is clearly larger than those at other positions.
 namespace alidade {
 
 /// Target that was found: the outline of the template at the position of the match, and the blur
@@ -26,7 +26,7 @@ struct TargetMatch {
 /// Maximum of the correlations.
 struct Peak {
   double score = -1.0;
-  double lead = 0.0;  ///< over the best score half a template away or more
+  double lead = 0.0;  ///< score - best score at least half a template away
   cv::Point position;
 };
 
@@ -73,7 +73,8 @@ class LocalView {
   /// area the target has the size of ShrunkTemplate(). The area has a margin of this size on each
   /// side.
   cv::Mat SearchArea(double growth) const {
-    // From pixels of the shrunk patch to pixels of the patch, which grows about its middle.
+    // This warp converts pixels of the shrunk patch to pixels of the patch, which grows about its
+    // middle.
     const double k = growth / shrink_, offset = 0.5 / shrink_ - 0.5;
     const cv::Matx33d from_small(k, 0, growth * (offset - middle_.x) + middle_.x, 0, k,
                                  growth * (offset - middle_.y) + middle_.y, 0, 0, 1);
@@ -117,10 +118,10 @@ class LocalView {
   cv::Mat smooth_;
 };
 
-/// Searches for the target about `start`, up to the size of the target to each side. The target has
-/// about the same size and rotation, and is sharp or blurred. The blur must fit the motion from
-/// `previous`, the outline in the last image. Without this condition a blurred template, which has
-/// little texture, would match many areas.
+/// Searches for the target about `start`, up to the size of the target in each direction. The
+/// target must have about the same size and rotation, and may be blurred. The blur must fit the
+/// motion from `previous`, the outline in the last image. Without this condition a blurred
+/// template, which has little texture, would match many areas.
 inline std::optional<TargetMatch> FindNearby(const std::vector<const TargetTemplate*>& templates,
                                              const cv::Mat& grey, const Corners& start,
                                              const Corners& previous) {

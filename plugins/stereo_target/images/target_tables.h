@@ -11,13 +11,13 @@
 
 #include "alidade/io/number_rows.h"
 
-/// Readers of the tables next to the images of a target. The tables are read together with the
-/// images.
+/// Readers of the tables next to the images of a target. A reader reads its table row by row, in
+/// step with the images.
 namespace alidade {
 
-/// Reader of the boxes of the target: rows `frame,x,y,width,height` or `frame,x0,y0,...,x3,y3`,
-/// clockwise from the upper left, px. Frames count from 0 and increase. A row with `nan` values
-/// marks the target as not visible. A header is optional.
+/// Reader of the boxes of the target: rows `frame,x,y,width,height` or `frame,x0,y0,...,x3,y3`, px.
+/// The corners are clockwise from the upper left. Frames count from 0 and must increase. A row with
+/// `nan` values marks the target as not visible. A header is optional.
 class BoxRows {
  public:
   using Corners = std::array<cv::Point2f, 4>;
@@ -25,14 +25,14 @@ class BoxRows {
   BoxRows(const std::filesystem::path& path, const Place& place, const std::string& key)
       : rows_(path, place, key) {
     Advance();
-    if (!has_next_) rows_.FailLine("no rows", kFormats);
+    if (!has_next_) rows_.FailLine("the file contains no rows", kFormats);
   }
 
   /// Row of one frame.
   struct Row {
     std::optional<Corners> corners;  ///< empty if the target is not visible
   };
-  /// Returns the row of `frame`, or nullopt if the table has no such row. `frame` may not decrease
+  /// Returns the row of `frame`, or nullopt if the table has no such row. `frame` must not decrease
   /// between calls.
   std::optional<Row> At(std::int64_t frame) {
     while (has_next_ && next_frame_ < frame) Advance();
@@ -57,7 +57,7 @@ class BoxRows {
     const std::int64_t frame = rows_.Index(0, "frame");
     if (!first && frame <= next_frame_) {
       rows_.FailCell(0, "frame", "is not larger than in line " + std::to_string(line_before),
-                     "increasing frames");
+                     "increasing frame numbers");
     }
     next_frame_ = frame;
     next_.reset();
@@ -72,7 +72,7 @@ class BoxRows {
     if (numbers.size() == 4) {
       for (const std::size_t side : {2, 3}) {
         if (!(numbers[side] >= 4.0)) {
-          rows_.FailCell(side + 1, kNames[side], "is less than 4 px", "a box of the target");
+          rows_.FailCell(side + 1, kNames[side], "is less than 4 px", "a box of at least 4 x 4 px");
         }
       }
       next_ = FromBox(numbers[0], numbers[1], numbers[2], numbers[3]);
@@ -84,7 +84,7 @@ class BoxRows {
     }
     const std::vector<cv::Point2f> outline(corners.begin(), corners.end());
     if (!cv::isContourConvex(outline) || !(cv::contourArea(outline, true) >= 16.0)) {
-      rows_.FailLine("four corners that are not in order, or have no area",
+      rows_.FailLine("the four corners are not in order, or have no area",
                      "clockwise from the upper left: x0,y0,...,x3,y3");
     }
     next_ = corners;
@@ -106,7 +106,7 @@ class TruthRows {
   TruthRows(const std::filesystem::path& path, const Place& place, const std::string& key)
       : rows_(path, place, key) {
     if (!rows_.Next() || rows_.text(0) != "t_s" || rows_.size() < 2) {
-      rows_.FailLine("no header", "t_s,NAME,... with the names of the true values");
+      rows_.FailLine("the header is missing", "t_s,NAME,... with the names of the true values");
     }
     for (std::size_t i = 1; i < rows_.size(); ++i) names_.emplace_back(rows_.text(i));
     Advance();
@@ -114,8 +114,8 @@ class TruthRows {
 
   const std::vector<std::string>& names() const { return names_; }
   /// Returns the values of the row nearest to `timestamp`, if this row is within `tolerance`. If
-  /// two rows are equally near, the earlier one is used. An empty vector marks an unknown value.
-  /// `timestamp` may not decrease between calls.
+  /// two rows are equally near, the earlier row is used. An empty vector marks an unknown value.
+  /// `timestamp` must not decrease between calls.
   std::vector<std::vector<double>> At(Timestamp timestamp, Timestamp tolerance) {
     // The distance is a floating-point number, because a difference of integers could overflow.
     const auto distance = [timestamp](Timestamp candidate) {

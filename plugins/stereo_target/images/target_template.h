@@ -15,8 +15,8 @@ namespace alidade {
 /// Quadrangle in an image or a patch, px, clockwise from the upper left.
 using Corners = std::array<cv::Point2f, 4>;
 
-/// Returns the warp from the unit square to `corners`. The upper left corner of the square becomes
-/// the first corner.
+/// Returns the warp from the unit square to `corners`. The warp maps the upper left corner of the
+/// square to the first corner.
 inline cv::Matx33d FromUnit(const Corners& corners) {
   const Corners unit{cv::Point2f(0.0F, 0.0F), {1.0F, 0.0F}, {1.0F, 1.0F}, {0.0F, 1.0F}};
   return cv::getPerspectiveTransform(unit.data(), corners.data());
@@ -42,8 +42,8 @@ inline cv::Point2f MiddleOf(const Corners& corners) {
 /// Appearance of a target in one image.
 class TargetTemplate {
  public:
-  /// `grey` is the image as float. `scale` is the inverse scale of the target in this image, and
-  /// `variance` is the relative variance of `scale`.
+  /// `grey` is the image, with grey values of type float. `scale` is the inverse scale of the
+  /// target in this image, and `variance` is the relative variance of `scale`.
   TargetTemplate(const cv::Mat& grey, const Corners& outline, double scale, double variance)
       : scale_(scale), variance_(variance) {
     const double width =
@@ -60,11 +60,11 @@ class TargetTemplate {
     patch_ = Blurred({});
   }
 
-  const cv::Mat& patch() const { return patch_; }  ///< image within the outline, grey as float
+  const cv::Mat& patch() const { return patch_; }  ///< image within the outline, float
   cv::Mat Blurred(const MotionBlur& blur) const { return blur.Apply(padded_patch_, size_); }
   /// Returns the warp from the patch to the image that contains the template.
   const cv::Matx33d& image_from_patch() const { return image_from_patch_; }
-  double scale() const { return scale_; }        ///< inverse scale in that image
+  double scale() const { return scale_; }        ///< inverse scale in the image
   double variance() const { return variance_; }  ///< relative variance of scale
   Corners corners() const { return CornersOf(size_); }
   /// Returns the warp from the patch to an outline in an image.

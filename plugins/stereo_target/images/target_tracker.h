@@ -30,20 +30,19 @@ struct TargetOptions {
   explicit TargetOptions(Params& p)
       : warp(static_cast<Warp>(p.Choice(
             "warp", {"similarity", "affine", "homography"},
-            "possible changes of the target in the image: it moves, turns and grows; or also "
-            "stretches and shears; or is a plane that tilts, which needs `camera` or "
-            "`stereo`",
+            "possible changes of the target in the image: similarity: shift, rotation and size; "
+            "affine: stretch and shear, too; homography: a plane that tilts, which needs "
+            "`camera` or `stereo`",
             0))),
         min_similarity(p.Number("min_similarity", "1",
-                                "minimum correlation of the target and its template", {-1.0, 1.0},
+                                "minimum correlation of the target with its template", {-1.0, 1.0},
                                 0.7)),
         max_relative_sigma(p.Positive("max_relative_sigma", "1",
                                       "maximum relative standard deviation of the scale", 0.2)),
-        refresh_similarity(
-            p.Number("refresh_similarity", "1",
-                     "a lower correlation with the template requires a new one; each "
-                     "new template adds its error to all later measurements",
-                     {-1.0, 1.0}, 0.8)),
+        refresh_similarity(p.Number("refresh_similarity", "1",
+                                    "correlation below which a new template is recorded; each "
+                                    "new template adds its error to all later measurements",
+                                    {-1.0, 1.0}, 0.8)),
         refresh_scale(p.Number("refresh_scale", "1",
                                "a new template is recorded if the target is larger or smaller by "
                                "more than this factor",
@@ -55,22 +54,23 @@ struct TargetOptions {
 /// A grid of points of the target is tracked from the last image [Lucas1981], [Kalal2010], and a
 /// similarity is fitted to these points. Starting from the similarity, the target is aligned with a
 /// template, see Align(). Errors therefore do not accumulate from image to image. The first
-/// template is used as long as it fits well. Otherwise the tracker uses the template with the most
-/// precise size, among all that were recorded. Each template adds its own error.
+/// template is used as long as it fits well. Otherwise the tracker uses the recorded template that
+/// determines the size most precisely. Each template adds its own error.
 ///
 /// If no template fits, the target is searched for nearby, see FindNearby(). It is then aligned
 /// with templates to which the blur of the motion was applied [Jin2005]. A blurred image determines
-/// the size less precisely, which is included in the variance of the size. A blurred image provides
-/// neither a template nor a size for the next image. If this search fails too, the target is only
-/// followed for some images. After that it is lost, and the whole image is searched.
+/// the size less precisely, which increases the variance of the size. A blurred image provides
+/// neither a template nor a size for the next image. If this search fails, too, the tracker follows
+/// the target for some images without a measurement. After these images the target is lost, and the
+/// tracker searches the whole image.
 class TargetTracker {
  public:
   using Corners = alidade::Corners;
 
   /// Position and size of the target.
   struct TrackedTarget {
-    cv::Point2d middle;    ///< px; the point that was the middle in the first image
-    cv::Rect2d box;        ///< px, upright, around the whole target
+    cv::Point2d middle;    ///< point that was the middle in the first image, px
+    cv::Rect2d box;        ///< upright box around the target, px
     double inverse_scale;  ///< first size / size; for a plane, depth / first depth
     double variance;       ///< variance of inverse_scale
   };
@@ -102,7 +102,7 @@ class TargetTracker {
     return tracked;
   }
 
-  /// Returns the outline in the last image, also if the target was followed but not measured.
+  /// Returns the outline in the last image, even if the target was followed but not measured.
   /// Returns nullopt if the target is lost.
   std::optional<Corners> outline() const {
     if (is_lost_ || templates_.empty()) return std::nullopt;
@@ -111,8 +111,8 @@ class TargetTracker {
 
  private:
   static constexpr std::size_t kTemplates = 6;  ///< maximum number of templates
-  static constexpr int kMaxUnmeasured = 10;     ///< images without a measurement before a loss
-  static constexpr double kBoxGrowth = 2.0;     ///< maximum factor of area, relative to a given box
+  static constexpr int kMaxUnmeasured = 10;     ///< unmeasured images until the target is lost
+  static constexpr double kBoxGrowth = 2.0;     ///< maximum ratio of the area to that of a box
 
   /// Target that was aligned with a template.
   struct Fit {
@@ -164,7 +164,7 @@ class TargetTracker {
     return Accept(fit);
   }
 
-  /// Searches the whole image. A match must have a higher similarity than one at an expected
+  /// Searches the whole image. A match must have a higher similarity than a match at an expected
   /// position.
   std::optional<TrackedTarget> SearchAndMeasure() {
     const auto guess = FindAnywhere(templates_, grey_, outline_, options_.min_similarity);
@@ -243,9 +243,9 @@ class TargetTracker {
             total_scale * total_scale * relative};
   }
 
-  /// Returns the quotient of two sizes of the target: in the image of the template, and under
-  /// `warp`. For a plane under a homography, returns Z / Z0. Z0 is the depth of the middle x in the
-  /// image of the template, Z is the depth under `warp`:
+  /// Returns the size of the target in the image of the template, divided by its size under `warp`.
+  /// For a plane under a homography, returns Z / Z0. Z0 is the depth of the middle x in the image
+  /// of the template. Z is the depth under `warp`:
   ///
   ///   H = s (R + t n' / d) maps x, with third element 1, to s Z / Z0 times its image
   ///
@@ -295,9 +295,9 @@ class TargetTracker {
            cv::Rect2f({0.0F, 0.0F}, cv::Size2f(size)).contains(middle);
   }
 
-  /// Follows a grid of points from the last image and back. Uses the half of the points with the
-  /// smaller errors of return [Kalal2010], and the similarity with the most inliers. Returns
-  /// nullopt if too few points agree with the similarity.
+  /// Follows a grid of points from the last image to this image and back. Uses the half of the
+  /// points that return closest to their starts [Kalal2010]. Fits the similarity with the most
+  /// inliers. Returns nullopt if too few points agree with the similarity.
   std::optional<Corners> Follow(const cv::Mat& image) const {
     constexpr int kGrid = 12, kMinPoints = 8, kWindow = 15, kLevels = 4;
     constexpr double kMaxReturnError = 2.0, kMaxResidual = 1.5;  // px
@@ -344,8 +344,8 @@ class TargetTracker {
   std::optional<cv::Matx33d> intrinsics_;
   std::vector<TargetTemplate> templates_;
   std::size_t last_ = 0;  ///< index of the template that fitted last
-  int misfits_ = 0;       ///< successive images in which no template fitted well
-  int unmeasured_ = 0;    ///< images since the last measurement
+  int misfits_ = 0;       ///< number of successive images without a good template
+  int unmeasured_ = 0;    ///< number of images since the last measurement
   bool is_lost_ = false;
   Corners outline_{};   ///< outline of the target in the last image
   cv::Mat grey_;        ///< current image, as float

@@ -18,21 +18,21 @@ namespace alidade {
 /// because a search takes longer than the tracking of features.
 class CornerFinder {
  public:
-  /// Response and position.
+  /// Response and position of a corner.
   using Corner = std::pair<float, cv::Point>;
 
   explicit CornerFinder(const TrackerOptions& options) : options_(options) {}
 
   /// Returns the corners of the next rows of cells, the strongest first. Searches as many rows of
-  /// cells as `missing` features fill, rounded up. Omits corners that are too close to the rim for
-  /// tracking.
+  /// cells as `missing` features would fill, rounded up. Omits corners that are too close to the
+  /// rim for tracking.
   const std::vector<Corner>& Find(const cv::Mat& image, int missing) {
     const int rows = options_.cells[1];
     const auto fraction = static_cast<double>(missing) / options_.features;
     const int count = std::clamp(static_cast<int>(std::ceil(fraction * rows)), 1, rows);
     strongest_.resize(static_cast<std::size_t>(rows), 0.0);
     corners_.clear();
-    if (count == rows) next_row_ = 0;  // then the threshold uses this image only
+    if (count == rows) next_row_ = 0;  // the threshold then uses only this image
     const int last = std::min(rows, next_row_ + count);
     Search(image, next_row_, last);
     if (last < next_row_ + count) Search(image, 0, next_row_ + count - rows);
@@ -46,7 +46,7 @@ class CornerFinder {
   void Search(const cv::Mat& image, int first, int last) {
     const int rows = options_.cells[1];
     const auto top_row = [&](int row) { return (row * image.rows + rows - 1) / rows; };
-    const int reach = options_.corner_px / 2 + 2;  // rows needed beyond the cells
+    const int reach = options_.corner_px / 2 + 2;  // rows of pixels needed beyond the cells
     const int top = std::max(0, top_row(first) - reach);
     const int bottom = std::min(image.rows, top_row(last) + reach);
     cv::cornerMinEigenVal(image.rowRange(top, bottom), response_, options_.corner_px);
@@ -59,8 +59,8 @@ class CornerFinder {
       cv::minMaxLoc(response_.rowRange(top_row(row) - top, top_row(row + 1) - top), nullptr,
                     &strongest);
     }
-    // The threshold is relative to the maximum of the whole image. The maximum of a row of cells
-    // that is not searched now is that of its last search.
+    // The threshold is relative to the maximum of the whole image. A row of cells that is not
+    // searched now contributes the maximum of its last search.
     const auto threshold =
         static_cast<float>(options_.quality * *std::ranges::max_element(strongest_));
     const int y_end = std::min(top_row(last), image.rows - margin);
@@ -75,19 +75,19 @@ class CornerFinder {
   }
 
   TrackerOptions options_;
-  std::vector<double> strongest_;  ///< by row of cells: maximum in the last search
+  std::vector<double> strongest_;  ///< maximum of each row of cells in its last search
   int next_row_ = 0;               ///< row of cells to search next
   std::vector<Corner> corners_;
   cv::Mat response_, largest_;
 };
 
-/// Returns the point near `start` that alignment finds best: it also stays in place if its patch
-/// grows, turns or is sheared [Forstner1987]:
+/// Returns the point near `start` that alignment finds most precisely. This point does not move if
+/// its patch grows, turns or is sheared [Forstner1987]:
 ///
-///   p = (sum g g')^-1 sum g g' x,   g the gradient at x
+///   p = (sum g g')^-1 sum g g' x,   with the gradient g at x
 ///
 /// Any other point would drift during tracking. Returns `start` if there is no such point nearby,
-/// or if it is too close to the rim for tracking.
+/// or if this point is too close to the rim for tracking.
 inline cv::Point2f StablePoint(const cv::Mat& image, const TrackerOptions& options,
                                cv::Point2f start) {
   constexpr int kMaxIterations = 5;

@@ -38,8 +38,9 @@ struct ExpectedPoint {
 /// contain fewer than their share of all features. Each feature is aligned with its patch at the
 /// first detection (FoundPatch), starting from
 ///
-///   its expected position  if its 3.7-sigma ellipse is small, and it is found there [Davison2007]
-///   optical flow           otherwise (PyramidFlow), started at its expected or last position
+///   the expected position  if its 3.7-sigma ellipse is small, and the feature is found there
+///                          [Davison2007]
+///   optical flow           otherwise; PyramidFlow starts from the expected or the last position
 ///
 /// A feature is lost in these cases:
 ///   - Its patch leaves the image, or no longer looks as it did at the first detection.
@@ -58,18 +59,18 @@ class FeatureTracker {
  public:
   struct Feature {
     std::int64_t id;
-    cv::Point2f position;  ///< px; the centre of the upper left pixel is (0, 0)
+    cv::Point2f position;  ///< position, px; the centre of the upper left pixel is (0, 0)
     FoundPatch patch;      ///< patch about the position
   };
   /// Expected positions in the order of the features; nullopt for a feature without an expectation.
-  /// The list is empty if no feature has one.
+  /// The list is empty if no feature has an expectation.
   using Expectations = std::vector<std::optional<ExpectedPoint>>;
 
   explicit FeatureTracker(const TrackerOptions& options)
       : options_(options), flow_(options.window_px, options.levels), finder_(options) {}
 
-  /// Adds points that are tracked from the next image on, besides corners. The points get the first
-  /// ids.
+  /// Adds points that are tracked from the next image on, in addition to corners. These points have
+  /// the first ids.
   void Add(const std::vector<cv::Point2f>& points) { added_points_ = points; }
   /// Returns the minimum distance of a tracked point from the rim of an image, px.
   int margin() const { return options_.margin(); }
@@ -169,7 +170,7 @@ class FeatureTracker {
   }
 
   /// Removes features that were not found, are near the rim of an image of `size`, or are too close
-  /// to another one.
+  /// to another feature.
   void RemoveLost(cv::Size size) {
     const int half = options_.window_px / 2;
     const auto margin = static_cast<float>(half);
@@ -242,9 +243,9 @@ class FeatureTracker {
   std::vector<cv::Point2f> added_points_;  ///< points to track from the next image on
   std::int64_t next_id_ = 0;
 
-  // Buffers.
+  // Buffers: members, so that their memory is reused.
   Expectations expected_;
-  std::vector<cv::Point2f> positions_;  ///< position of each feature; valid if is_found_
+  std::vector<cv::Point2f> positions_;  ///< position of each feature, if is_found_
   std::vector<unsigned char> is_found_;
   std::vector<std::size_t> remaining_;
   std::vector<cv::Point2f> flow_start_, flow_end_, flow_return_;

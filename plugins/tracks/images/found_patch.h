@@ -14,13 +14,13 @@ namespace alidade {
 
 /// Patch about a feature at its first detection. In each image the feature is aligned with this
 /// patch. Errors therefore do not accumulate from image to image. The inverse compositional
-/// algorithm [Baker2004] computes only once all that does not depend on the image:
+/// algorithm [Baker2004] computes everything that does not depend on the image only once:
 ///
 ///   e(x) = a sampled(A x + t) + b - patch(x),   d = (J' J)^-1 J' e,   (A, t) <- (A, t) (I + D)^-1
 ///
 /// x is relative to the middle of the patch, in units of half its side. J is the derivative of the
-/// patch with respect to the six numbers of D, without the part that a change of light explains.
-/// With a and b, `sampled` gets the mean and the variance of the patch. J is orthogonal to 1 and to
+/// patch with respect to the six numbers of D, without the part that a change of light explains. a
+/// and b convert `sampled` to the mean and the variance of the patch. J is orthogonal to 1 and to
 /// the patch. Therefore J' e = a J' sampled.
 class FoundPatch {
  public:
@@ -53,7 +53,7 @@ class FoundPatch {
     jacobian_.rowwise() -= jacobian_.colwise().mean().eval();
     jacobian_ -= unit * (unit.transpose() * jacobian_).eval();
     const Matrix6 normal = jacobian_.transpose() * jacobian_;
-    // Keeps a change near 0 if the texture does not determine it, such as the rotation of a disc.
+    // Limits the changes that the texture does not determine, such as the rotation of a disc.
     constexpr float kWeak = 1e-3F;
     const Matrix6 damped = normal + kWeak * normal.trace() / 6.0F * Matrix6::Identity();
     inverse_ = damped.ldlt().solve(Matrix6::Identity());
@@ -100,8 +100,8 @@ class FoundPatch {
   ///
   ///   C = A (sum over cells of (sum k e) (sum k e)') A',   k = [(J' J)^-1 J']_t
   ///
-  /// The side of a cell is a fifth of that of the patch. C is consistent for any correlation of e
-  /// within a cell [Liang1986]. A patch across a depth edge, whose parts move separately, has a
+  /// The side of a cell is a fifth of the side of the patch. C is consistent for any correlation of
+  /// e within a cell [Liang1986]. A patch across a depth edge, whose parts move separately, has a
   /// large covariance. The covariance is zero before the first alignment.
   Eigen::Matrix2f Covariance() const {
     constexpr int kCells = 5;
@@ -152,8 +152,8 @@ class FoundPatch {
     return true;
   }
 
-  /// Samples a row by bilinear interpolation. The work is split into loops, so that the compiler
-  /// can vectorise those without memory access by index.
+  /// Samples a row by bilinear interpolation. The work is split into several loops, so that the
+  /// compiler can vectorise the loops that do not access memory by index.
   void SampleRow(const cv::Mat& image, Eigen::Vector2f start, Eigen::Vector2f step,
                  float* destination) const {
     float right[kMaxSide], down[kMaxSide];
@@ -192,10 +192,10 @@ class FoundPatch {
   Eigen::Matrix<float, Eigen::Dynamic, 6> jacobian_;
   Matrix6 inverse_ = Matrix6::Zero();                  ///< inverse of J' J
   Eigen::Matrix<float, Eigen::Dynamic, 2> influence_;  ///< k, see Covariance()
-  Eigen::Matrix2f shape_ = Eigen::Matrix2f::Zero();    ///< A: from units of half the side to px
-  Eigen::VectorXf sampled_;  ///< image values at the patch, from the last alignment
-  float gain_ = 0.0F;        ///< a
-  float mean_ = 0.0F;        ///< mean of sampled_
+  Eigen::Matrix2f shape_ = Eigen::Matrix2f::Zero();    ///< matrix A, px per half side
+  Eigen::VectorXf sampled_;                            ///< image, sampled in the last alignment
+  float gain_ = 0.0F;                                  ///< a, the scale of the grey values
+  float mean_ = 0.0F;                                  ///< mean of sampled_
 };
 
 }  // namespace alidade

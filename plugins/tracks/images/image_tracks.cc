@@ -28,21 +28,21 @@ class ImageTracks : public Source {
     Params& p = arguments.params;
     rate_hz_ =
         p.Number("rate_hz", "Hz",
-                 "images per second, if there is no table of times; 0: from the table or the "
-                 "video",
+                 "images per second; 0: the times are read from a table next to the images, or "
+                 "from the video",
                  {0.0, 1e6}, 0.0);
     max_frames_ = p.Integer("max_frames", "maximum number of images; 0: all", 0, 1 << 30, 0);
     tolerance_ = TimestampFromSeconds(
         p.Number("truth_tolerance_s", "s",
-                 "maximum time difference of the true pose of an image; default for the layout of "
-                 "TUM 5e-3",
+                 "maximum time from an image to its true pose; default for the layout of TUM: "
+                 "5e-3",
                  {0.0, 1e3}, 1e-3));
-    estimate_noise_ = p.Flag(
-        "estimate_noise",
-        "each measurement has its own covariance; false: the covariance of the sensor", false);
+    estimate_noise_ =
+        p.Flag("estimate_noise",
+               "true: each measurement has its own covariance; false: that of the sensor", false);
     systematic_px_ = p.Positive("sigma_systematic_px", "px",
-                                "with estimate_noise: systematic error of a coordinate not visible "
-                                "in the residuals, 1 sigma",
+                                "systematic error of a coordinate, which the residuals do not "
+                                "contain, 1 sigma; used if estimate_noise is true",
                                 0.15);
     for (const char* key : {"path", "images", "known", "guide", "state_entry"}) {
       arguments.entry.Declare(key);
@@ -70,7 +70,7 @@ class ImageTracks : public Source {
   Place place() const override { return images_->place(); }
   std::int64_t size() const override {
     if (images_->size() <= 0)
-      return max_frames_ > 0 ? max_frames_ : -1;  // unknown for a camera and for some videos
+      return max_frames_ > 0 ? max_frames_ : -1;  // -1: the number of images is unknown
     const std::int64_t remaining = start_.Remaining(images_->size());
     return max_frames_ > 0 ? std::min(max_frames_, remaining) : remaining;
   }
@@ -131,9 +131,10 @@ class ImageTracks : public Source {
     if (std::min(image_.cols, image_.rows) >= min_side) return;
     throw Error(ExitCode::kBadData,
                 ErrorLine(place(), {},
-                          SizeText(image_.size()) + ", smaller than a tracked patch of " +
-                              std::to_string(tracker_.window_px()) + " px with its rim",
-                          std::to_string(min_side) + " px or more, or a smaller source.window_px"));
+                          "the image has " + SizeText(image_.size()) + ", but a tracked patch of " +
+                              std::to_string(tracker_.window_px()) + " px with its rim is larger",
+                          "at least " + std::to_string(min_side) +
+                              " px on each side, or a smaller source.window_px"));
   }
 
   /// Returns the positions at which the filter `guide` expects the features.
@@ -151,7 +152,7 @@ class ImageTracks : public Source {
     return expectations;
   }
 
-  /// Returns R, row-major.
+  /// Returns the covariance R of a measurement, row-major.
   std::vector<double> CovarianceOf(const FeatureTracker::Feature& feature) const {
     const double systematic = systematic_px_ * systematic_px_;
     const Eigen::Matrix2d c = feature.patch.Covariance().cast<double>();
@@ -175,10 +176,12 @@ class ImageTracks : public Source {
       const auto u = static_cast<float>(rows.Number(0, "u"));
       const auto v = static_cast<float>(rows.Number(1, "v"));
       const double depth_m = rows.Number(2, "depth_m");
-      if (!(depth_m > 0.0)) rows.FailCell(2, "depth_m", "is not positive", "m, > 0");
+      if (!(depth_m > 0.0)) rows.FailCell(2, "depth_m", "is not positive", "a depth above 0 m");
       known_.push_back({{u, v}, depth_m, rows.line()});
     }
-    if (known_.empty()) rows.FailLine("no rows", "u,v,depth_m of a point in the first image");
+    if (known_.empty()) {
+      rows.FailLine("the file contains no rows", "u,v,depth_m of a point in the first image");
+    }
     streams_.push_back({"known", 3});
   }
 
@@ -201,12 +204,13 @@ class ImageTracks : public Source {
 
   void Open(const Node& key, const std::string& names, const std::filesystem::path& folder) {
     if (key.Text().empty()) {
-      key.Fail("no path", "a folder of images, a video, or a camera such as /dev/video0");
+      key.Fail("the path is empty", "a folder of images, a video, or a camera such as /dev/video0");
     }
     const std::filesystem::path path = folder / key.Text();
     images_.emplace(path, names, key);
     const std::filesystem::path image_folder = images_->is_video() ? path.parent_path() : path;
-    // In the layouts of data sets, these files are in the parent folder of the folder of images.
+    // In the layouts of EuRoC and TUM, the calibration and the truth are in the parent of the
+    // folder of images.
     std::error_code ignored;
     const std::filesystem::path parent_folder =
         images_->is_video()
@@ -223,8 +227,8 @@ class ImageTracks : public Source {
       times_ = ImageTimes::FindNextTo(image_folder, /*by_layout=*/!images_->is_video(), key);
       if (!times_) rate_hz_ = images_->rate_hz();
       if (!times_ && !(rate_hz_ > 0.0)) {
-        key.Fail("no timestamps.csv next to the images",
-                 "that file, a table of EuRoC, TUM or KITTI next to the folder, or 'rate_hz'");
+        key.Fail("there is no timestamps.csv next to the images",
+                 "this file, a table of EuRoC, TUM or KITTI next to the folder, or 'rate_hz'");
       }
     }
     if (!times_) times_ = rate_hz_ > 0.0 ? ImageTimes(rate_hz_) : ImageTimes();

@@ -17,15 +17,15 @@ namespace alidade {
 ///   true poses   `groundtruth.tum` or `truth.tum` (world_from_cam), or TUM's `groundtruth.txt`
 ///   calibration  `calibration.yaml`, or EuRoC's `sensor.yaml`, see ReadCalibrationFile()
 ///
-/// The times of images of a live camera are those of their capture, and start at 0.
+/// The times of the images of a live camera are the times of capture. They start at 0.
 ///
 ///   stream   size  values       when
 ///   tracks   2     u, v         a feature is tracked; its id is the landmark
 ///   known    3     u, v, depth  the first image, for each point of the table `known`; replaces the
 ///                               first observation of the point
 ///
-/// With `guide`, features are searched for at the positions that this filter expects: see
-/// FeatureTracker.
+/// With the key `guide`, features are searched for at the positions that the filter `guide`
+/// expects: see FeatureTracker.
 ///
 /// With `estimate_noise` each measurement of `tracks` has its own covariance,
 ///
@@ -33,7 +33,7 @@ namespace alidade {
 ///
 /// C is FoundPatch::Covariance(), and sigma is sigma_systematic_px of the config.
 ///
-/// Keys         kImageTracksKeys in tracks_plugin.cc, those of TrackerOptions.
+/// Keys         kImageTracksKeys in tracks_plugin.cc, and those of TrackerOptions.
 /// Errors       those of ImageReader, TimestampRows and TumRows; kBadConfig.
 std::unique_ptr<Source> CreateImageTracks(const SourceArguments& arguments);
 

@@ -15,16 +15,18 @@ class PyramidFlow {
   /// `window_px` is the side of a patch, `levels` the number of levels above the image itself.
   PyramidFlow(int window_px, int levels) : window_(window_px, window_px), levels_(levels) {}
 
-  /// Sets the next image, 8-bit grey. The image that was set before becomes the last image.
+  /// Sets the next image, 8-bit grey. The image that was set by the previous call becomes the last
+  /// image.
   void SetNextImage(const cv::Mat& image) {
     std::swap(last_, next_);
     image.copyTo(next_.image);
     next_.is_built = false;
   }
 
-  /// Finds the approximate positions in the next image of the points `start` of the last image.
-  /// `end` contains the expected positions, and receives the results. The image itself is only used
-  /// if its pyramid has no levels above it. `found` is 0 for points that are not found.
+  /// Follows points from the last to the next image, and returns approximate positions. `start`
+  /// contains the positions in the last image. `end` contains the expected positions in the next
+  /// image, and receives the results. The image itself is only used if its pyramid has no levels
+  /// above it. `found` is 0 for points that are not found.
   void TrackForward(const std::vector<cv::Point2f>& start, std::vector<cv::Point2f>& end,
                     std::vector<unsigned char>& found) {
     const std::vector<cv::Mat>&last = Build(last_), &next = Build(next_);
@@ -40,9 +42,9 @@ class PyramidFlow {
     for (cv::Point2f& point : end) point /= scale;
   }
 
-  /// Finds the positions in the last image of the points `start` of the next image. `end` contains
-  /// the expected positions, and receives the results. The expected positions must be close,
-  /// because no pyramid is used.
+  /// Follows points from the next to the last image. `start` contains the positions in the next
+  /// image. `end` contains the expected positions, and receives the results. The expected positions
+  /// must be close, because no pyramid is used.
   void TrackBackward(const std::vector<cv::Point2f>& start, std::vector<cv::Point2f>& end,
                      std::vector<unsigned char>& found) {
     cv::calcOpticalFlowPyrLK(Build(next_), Build(last_), start, end, found, error_, window_, 0,
@@ -56,8 +58,8 @@ class PyramidFlow {
     bool is_built = false;
   };
 
-  /// Builds the pyramid without derivatives, because it takes longer to read them from memory than
-  /// to compute them.
+  /// Builds the pyramid without derivatives, because reading derivatives from memory takes longer
+  /// than computing them.
   const std::vector<cv::Mat>& Build(Pyramid& pyramid) {
     if (!pyramid.is_built) {
       cv::buildOpticalFlowPyramid(pyramid.image, pyramid.levels, window_, levels_, false);

@@ -33,7 +33,7 @@ TEST(Seconds, AreExactToTheNanosecond) {
   EXPECT_EQ(text(0), "0.000000000");
   EXPECT_EQ(text(33'000'000), "0.033000000");
   EXPECT_EQ(text(-1), "-0.000000001");
-  // A double holds only 16 digits.
+  // A double has only 16 significant digits.
   EXPECT_EQ(text(1'700'000'000'123'456'789), "1700000000.123456789");
   EXPECT_EQ(text(INT64_MAX), "9223372036.854775807");
   EXPECT_EQ(text(INT64_MIN), "-9223372036.854775808");

@@ -90,8 +90,8 @@ TEST(Random, UniformFillsItsInterval) {
 }
 
 TEST(Random, NormalHasTheMomentsOfTheNormalDistribution) {
-  // The moments are 0, 1, 0 and 3. Their estimates have the variances 1, 2, 15 and 96, each divided
-  // by N. The tolerance is 5 sigma.
+  // The moments are 0, 1, 0 and 3. The estimates of the moments have the variances 1, 2, 15 and 96,
+  // each divided by N. The tolerance is 5 sigma.
   double m1 = 0.0, m2 = 0.0, m3 = 0.0, m4 = 0.0;
   int beyond = 0;
   for (const double x : Normals(Random(11))) {
@@ -109,7 +109,8 @@ TEST(Random, NormalHasTheMomentsOfTheNormalDistribution) {
 }
 
 TEST(Random, NeighbouringNormalsAreIndependent) {
-  // Both of two successive values are computed from one point in the unit disc.
+  // Normal numbers are computed in pairs: both numbers of a pair come from the same point in the
+  // unit disc.
   const std::vector<double> values = Normals(Random(12));
   const std::vector<double> later(values.begin() + 1, values.end());
   EXPECT_NEAR(Correlation(later, values), 0.0, 5.0 / std::sqrt(kCount));

@@ -21,9 +21,9 @@ TEST(ConsistencyBounds, AreThoseOfAChiSquareMean) {
   EXPECT_NEAR(bounds.high, 241.058 / 200.0, 1e-5);
 }
 
-// Each mean is that of 50 values of chi2(1) below the 90 % gate. In 95 % of 4000 cases the mean
-// must lie within the bounds. The gate reduces the expected mean to 0.62, so the upper bound is
-// below 1.
+// Each mean is computed from 50 values of chi2(1) that are below the 90 % gate. In 95 % of 4000
+// cases the mean must lie within the bounds. The gate reduces the expected mean to 0.62, so the
+// upper bound is below 1.
 TEST(ConsistencyBounds, KnowWhatAGateCutsOff) {
   const double gate = ChiSquareQuantile(0.9, 1);
   const Interval bounds = ConsistencyBounds(1.0, 50.0, gate);
@@ -52,8 +52,8 @@ struct Quantiles {
   double x[6];
 };
 constexpr double kProbabilities[] = {1e-9, 0.05, 0.5, 0.95, 0.999, 1.0 - 1e-12};
-// These values were computed with 40 digits by mpmath and by Boost.Math. Both agree in all digits
-// shown here.
+// These values were computed with 40 digits by mpmath and by Boost.Math. The two programs agree in
+// all digits shown here.
 constexpr Quantiles kQuantiles[] = {
     {1,
      {1.5707963267948968e-18, 0.0039321400000195232, 0.45493642311957275, 3.8414588206941245,
@@ -88,8 +88,8 @@ TEST(ChiSquareQuantile, IsAccurateToRounding) {
   }
 }
 
-// The median is dof - 2 / 3 + 32 / (405 dof), with an error of at most 0.06 / dof^2. This is the
-// known series in 1 / dof.
+// The median is dof - 2 / 3 + 32 / (405 dof), with an error of at most 0.06 / dof^2 (a known series
+// in 1 / dof).
 TEST(ChiSquareQuantile, OfManyDegreesOfFreedomIsFound) {
   for (const double dof : {1e4, 1e6, 1e8}) {
     EXPECT_NEAR(ChiSquareQuantile(0.5, dof) / (dof - 2.0 / 3.0 + 32.0 / (405.0 * dof)), 1.0, 1e-12);

@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::string_view_literals;  // NOLINT(google-build-using-namespace)
 
-/// Returns the error that `call` throws as `CODE message`.
+/// Returns the error that `call` throws, in the form `CODE message`.
 template <class Call>
 std::string Failure(const Call& call) {
   try {
@@ -47,7 +47,8 @@ class ConfigFolder : public ::testing::Test {
     return file;
   }
 
-  /// Returns the error of reading the file `name`. In the message, `D/` stands for the folder.
+  /// Returns the error that is thrown when the file `name` is read. In the message, `D/` replaces
+  /// the path of the folder.
   std::string Fault(const std::string& name) const {
     std::string message = Failure([&] { Config::FromFile(folder_ / name); });
     const std::string folder = folder_.path().string();
@@ -63,17 +64,18 @@ class ConfigFolder : public ::testing::Test {
 TEST(ConfigFile, RefusesWhatIsNotStrict) {
   EXPECT_EQ(TextError("sensors:\n  stereo: {model: a}\n  scale: {model: b}\n  stereo: {}\n"),
             "78 f:4:3 sensors.stereo: duplicate key; the first one is at line 2");
-  EXPECT_EQ(TextError("alidade: 1\na: &x [*x]\n"), "78 f:2:8 a: alias refers to itself");
+  EXPECT_EQ(TextError("alidade: 1\na: &x [*x]\n"), "78 f:2:8 a: the alias refers to itself");
   EXPECT_EQ(TextError("sensors:\n\tstereo: {}\n"),
-            "78 f:2:1: tab in the indentation; expected spaces");
+            "78 f:2:1: the indentation contains a tab; expected spaces");
   EXPECT_EQ(TextError("alidade: 1\nname: caf\xE9\n"),
             "78 f:2:10: invalid UTF-8; expected UTF-8 text");
-  EXPECT_EQ(TextError("alidade: 1\nname: a\0b\n"sv), "78 f:2:8: NUL byte; expected text");
+  EXPECT_EQ(TextError("alidade: 1\nname: a\0b\n"sv), "78 f:2:8: the text contains a NUL byte");
   EXPECT_EQ(TextError("base: &base {sigma_px: 1}\nstereo:\n  <<: *base\n"),
             "78 f:3:3 stereo: merge key '<<' is not supported; expected the keys themselves");
   EXPECT_EQ(TextError("alidade: 1\n---\nalidade: 1\n"),
-            "78 f:2:1: second document; expected one document in a file");
-  EXPECT_EQ(TextError("# nothing but a comment\n"), "78 f: file is empty; expected a map of keys");
+            "78 f:2:1: a second document begins here; expected one document in a file");
+  EXPECT_EQ(TextError("# nothing but a comment\n"),
+            "78 f: the file is empty; expected a map of keys");
 }
 
 TEST(ConfigFile, AcceptsByteOrderMarkAndCrlf) {
@@ -102,11 +104,13 @@ TEST(ConfigFile, AliasBombStaysSmall) {
     bomb += std::string(1, key) + ": &" + key + " [" + Repeated(alias + ", ", 9 * 4) + "]\n";
   }
   EXPECT_EQ(TextError(bomb),
-            "78 f:6:8 f: too large after its aliases are expanded; expected at most 100000 values");
+            "78 f:6:8 f: the config is too large after its aliases are expanded; expected at most "
+            "100000 values");
   const std::string lines = "a: &a \"" + std::string(500'000, 'x') + "\"\nb: [";
   EXPECT_EQ(
       TextError(lines + Repeated("*a, ", 40'000) + "]"),
-      "78 f:2:65 b: too large after its aliases are expanded; expected at most 8 MiB of text");
+      "78 f:2:65 b: the config is too large after its aliases are expanded; expected at most 8 "
+      "MiB of text");
 }
 
 TEST(ConfigFile, AliasIsACopy) {
@@ -132,7 +136,8 @@ TEST(ConfigFile, DeepNestingFailsEarly) {
   }
   EXPECT_NE(TextError(Repeated("? ", kSize)), "no error");
   EXPECT_EQ(TextError(chain), "78 f:64:12: nested too deep; expected at most 64 levels");
-  // This takes about 10 ms. A scanner that reads to the end would need seconds in a debug build.
+  // Parsing takes about 10 ms. A scanner that read the text to its end would need seconds in a
+  // debug build.
   EXPECT_LT(std::clock() - start, 2 * CLOCKS_PER_SEC);
 }
 
@@ -148,7 +153,7 @@ TEST(ConfigFile, OneMebibyteIsTheLimit) {
   constexpr std::size_t kLimit = 1 << 20;
   EXPECT_EQ(TextError(text + std::string(kLimit - text.size(), 'x')), "no error");
   EXPECT_EQ(TextError(text + std::string(kLimit + 1 - text.size(), 'x')),
-            "78 f: larger than 1 MiB; expected a config of at most 1 MiB");
+            "78 f: the config is larger than 1 MiB; expected at most 1 MiB");
 }
 
 TEST(ConfigFile, RefusesOddEncodings) {
@@ -161,14 +166,15 @@ TEST(ConfigFile, RefusesOddEncodings) {
             "78 f:1:1: invalid UTF-8; expected UTF-8 text");
   EXPECT_EQ(TextError("a: 1\n\xEF\xBB\xBF"
                       "b: 1"),
-            "78 f:2:1: byte order mark inside the text");
-  EXPECT_EQ(TextError("a: 1\rb: 1"), "78 f:1:5: carriage return without a line feed");
+            "78 f:2:1: a byte order mark is allowed only at the start of the text");
+  EXPECT_EQ(TextError("a: 1\rb: 1"), "78 f:1:5: a carriage return is not followed by a line feed");
   EXPECT_EQ(TextError("a: 1\n%anything"),
-            "78 f:2:1: '%' begins a line; expected quotes around a text that begins with '%'");
+            "78 f:2:1: the line begins with '%'; expected quotes around a text that begins with "
+            "'%'");
   EXPECT_EQ(TextError("# first\n%YAML 1.2\n---\na: 1"), "no error");
-  EXPECT_EQ(TextError("a: \x07"), "78 f:1:4: control character 0x07");
-  EXPECT_EQ(TextError("a: \"\\0\""), "78 f:1:4 a: NUL character in a text");
-  EXPECT_EQ(TextError("a: \"\\_\""), "78 f:1:4 a: escape sequence that is not a valid character");
+  EXPECT_EQ(TextError("a: \x07"), "78 f:1:4: control character 0x07 is not allowed");
+  EXPECT_EQ(TextError("a: \"\\0\""), "78 f:1:4 a: the text contains a NUL character");
+  EXPECT_EQ(TextError("a: \"\\_\""), "78 f:1:4 a: the escape sequence is not a valid character");
   EXPECT_EQ(TextError("a: \xF0\x9F\xA7\xAD \xC3\xA9 \xE2\x82\xAC"), "no error");
 }
 
@@ -207,7 +213,7 @@ TEST_F(ConfigFolder, UnreadableFileIsInputMissing) {
   fs::permissions(file, fs::perms::none);
   const pid_t child = fork();
   ASSERT_GE(child, 0);
-  if (child == 0) {  // root may read every file
+  if (child == 0) {  // the user root can read every file
     const bool dropped = geteuid() != 0 || seteuid(65534) == 0;
     _exit(!dropped                                                              ? 2
           : Fault("f.yaml") == "66 D/f.yaml: cannot be read: Permission denied" ? 0
@@ -215,7 +221,7 @@ TEST_F(ConfigFolder, UnreadableFileIsInputMissing) {
   }
   int status = 0;
   ASSERT_EQ(waitpid(child, &status, 0), child);
-  if (WEXITSTATUS(status) == 2) GTEST_SKIP() << "cannot give up root";
+  if (WEXITSTATUS(status) == 2) GTEST_SKIP() << "this process cannot drop the privileges of root";
   EXPECT_EQ(status, 0);
 }
 
@@ -247,7 +253,7 @@ TEST_F(ConfigFolder, RelativePathsAreTakenFromTheFileThatHasThem) {
 TEST_F(ConfigFolder, CyclicIncludeIsRefused) {
   Write("a.yaml", "include: b.yaml");
   Write("b.yaml", "x: 1\ninclude: ./a.yaml");
-  EXPECT_EQ(Fault("a.yaml"), "78 D/b.yaml:2:10 include: includes itself: 'D/./a.yaml'");
+  EXPECT_EQ(Fault("a.yaml"), "78 D/b.yaml:2:10 include: 'D/./a.yaml' includes itself");
 }
 
 TEST_F(ConfigFolder, IncludesThatMultiplyAreRefused) {

@@ -71,9 +71,11 @@ TEST(ConfigSet, ValueIsReadStrictly) {
 }
 
 TEST(ConfigSet, KeyPathMustFitTheTree) {
-  EXPECT_EQ(SetError("a.t.x", "1"), "--set a.t.x: 'a.t' is not a map; expected the key of a map");
-  EXPECT_EQ(SetError("a[0]", "1"), "--set a[0]: 'a' is not a list; expected the key of a list");
-  EXPECT_EQ(SetError("a.b[2]", "1"), "--set a.b[2]: 'a.b' has 2 items");
+  EXPECT_EQ(SetError("a.t.x", "1"),
+            "--set a.t.x: 'a.t' is not a map; expected a map before each key");
+  EXPECT_EQ(SetError("a[0]", "1"),
+            "--set a[0]: 'a' is not a list; expected a list before each index");
+  EXPECT_EQ(SetError("a.b[2]", "1"), "--set a.b[2]: 'a.b' has 2 items, numbered from 0");
   for (const char* key : {"", ".", "a..b", "a.", ".a", "a[", "a[]", "a[x]", "a[0", "a[0]b", "[0]",
                           "a[-1]", "a[99999999999999999999]"}) {
     EXPECT_NE(SetError(key, "1").find("not a key path"), std::string::npos) << key;
@@ -83,8 +85,8 @@ TEST(ConfigSet, KeyPathMustFitTheTree) {
 // A file with these keys could not be read again.
 TEST(ConfigSet, RefusesKeysThatAFileMayNotHave) {
   EXPECT_EQ(SetError("a.\xff", "1"), "--set: the key is not UTF-8");
-  EXPECT_EQ(SetError("a.x\ny", "1").find("--set: control character in the key"), 0u);
-  EXPECT_EQ(SetError("a." + std::string(257, 'x'), "1").find("--set: key longer than"), 0u);
+  EXPECT_EQ(SetError("a.x\ny", "1").find("--set: the key contains a control character"), 0u);
+  EXPECT_EQ(SetError("a." + std::string(257, 'x'), "1").find("--set: the key is longer than"), 0u);
 }
 
 TEST(ConfigSet, DepthIsLimited) {

@@ -19,8 +19,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 using testing::Message;
 using testing::Read;
 
-/// Calls `read` on the value of `v` and returns the error message without its start, `f.yaml:1:4 v:
-/// `.
+/// Calls `read` on the value of `v`. Returns the error message without the prefix `f.yaml:1:4 v: `.
 template <class Reader>
 std::string MessageOf(const std::string& value, const Reader& read) {
   const Config config = Read("v: " + value);
@@ -93,8 +92,9 @@ TEST(Node, NumberRefusesNanAndInfinity) {
 
 TEST(Node, NumberRefusesUnderflowAndOverflow) {
   for (const char* text : {"1e-400", "1e400", "-1e400", "1e-99999999999", "1e99999999999"}) {
-    EXPECT_EQ(NumberError(text), "'" + std::string(text) +
-                                     "' is too large or too small for a number; expected a number");
+    EXPECT_EQ(NumberError(text),
+              "'" + std::string(text) +
+                  "' is too large or too small to be represented; expected a number");
   }
 }
 
@@ -119,7 +119,7 @@ TEST(Node, ValueLeftOutIsPlacedAtItsKey) {
 
 TEST(Node, NumberIsReadTheSameInACommaLocale) {
   const testing::CommaLocale comma;
-  if (!comma.active()) GTEST_SKIP() << "localedef is not here";
+  if (!comma.active()) GTEST_SKIP() << "localedef is not available";
   EXPECT_EQ(NumberOf("0.5"), 0.5);
 }
 
@@ -183,7 +183,7 @@ TEST(Node, NumbersHaveTheLengthAsked) {
   EXPECT_EQ(MessageOf("[1, x, 3]", read),
             "f.yaml:1:8 v[1]: 'x' is not a finite number; expected a number");
   EXPECT_EQ(MessageOf("[]", [](const Node& node) { return node.Numbers(); }),
-            "an empty list; expected at least one number");
+            "the list is empty; expected at least one number");
 }
 
 TEST(ReadCovariance, IsSquareSymmetricAndPositive) {
@@ -194,11 +194,11 @@ TEST(ReadCovariance, IsSquareSymmetricAndPositive) {
             (std::vector<double>{4, 1, 1, 2}));
   EXPECT_EQ(error("[[1, 1], [1, 1]]"), "no error");
   EXPECT_EQ(error("[[0, 0], [0, 1e-20]]"), "no error");
-  EXPECT_EQ(error("[1, 2]"), "f.yaml:1:5 v[0]: not a row of numbers; expected 2 rows of 2");
-  EXPECT_EQ(error("[[1, 0]]"), "has 1 item; expected 2 rows of 2");
+  EXPECT_EQ(error("[1, 2]"), "f.yaml:1:5 v[0]: not a row of numbers; expected 2 rows of 2 numbers");
+  EXPECT_EQ(error("[[1, 0]]"), "has 1 item; expected 2 rows of 2 numbers");
   EXPECT_EQ(error("[[1, 0], [0]]"), "f.yaml:1:13 v[1]: has 1 item; expected 2");
   EXPECT_EQ(error("[[1, 0.5], [0.25, 1]]"),
-            "not symmetric: [0][1] is 0.5, [1][0] is 0.25; expected a covariance");
+            "not symmetric: [0][1] is 0.5, but [1][0] is 0.25; expected a symmetric matrix");
   // The eigenvalues of [[1, 2], [2, 1]] are 3 and -1.
   EXPECT_EQ(error("[[1, 2], [2, 1]]"),
             "not positive semi-definite: its smallest eigenvalue is -1; expected a covariance");
@@ -206,8 +206,8 @@ TEST(ReadCovariance, IsSquareSymmetricAndPositive) {
   const std::string mixed = "[[1e6, 0, 0], [0, 1e-14, 2e-14], [0, 2e-14, 1e-14]]";
   EXPECT_EQ(MessageOf(mixed, [](const Node& node) { return internal::ReadCovariance(node, 3); }),
             "not positive semi-definite: its smallest eigenvalue is -1e-14; expected a covariance");
-  // The first variance is zero, so its covariance must be zero too. The eigenvalues are 1 and
-  // -1e-18.
+  // The first variance is zero, so the covariance of the two elements must be zero too. The
+  // eigenvalues are 1 and -1e-18.
   EXPECT_EQ(error("[[0, 1e-9], [1e-9, 1]]"),
             "not positive semi-definite: its smallest eigenvalue is -1e-18; expected a covariance");
   // A negative variance is found even if it is far below the rounding error of the other variance.
@@ -246,7 +246,7 @@ TEST(Node, WrongUnitNamesTheRightOne) {
             "f.yaml:1:2 baseline_mm: wrong unit 'mm'; expected baseline_m");
   EXPECT_EQ(Message([&] { root.At("rate_rad_s"); }),
             "f.yaml:1:19 rate_deg_s: wrong unit 'deg_s'; expected rate_rad_s");
-  // Pixels cannot be converted to metres. sigma_m may be another key, which is read later.
+  // Pixels cannot be converted to metres. sigma_m may be a key that the program reads later.
   EXPECT_EQ(Message([&] { root.At("sigma_px"); }),
             "f.yaml:1:1 sigma_px: missing key; found 'sigma_m' at line 1");
   const std::string rejected = Message([&] { root.RejectUnread(); });
@@ -276,8 +276,8 @@ TEST(Node, EveryUnitIsKnownForOneOfItsQuantity) {
   }
 }
 
-// A key with a unit of another quantity may be another key. It is an error only if the program does
-// not read this key.
+// A key with a unit of another quantity may be a different key. It is an error only if the program
+// does not read this key.
 TEST(Node, UnitsOfDifferentQuantitiesDoNotConvert) {
   const std::vector<std::string> units = {"m",  "s",   "rad",  "hz", "px",     "m2",
                                           "s2", "px2", "rad2", "kg", "percent"};

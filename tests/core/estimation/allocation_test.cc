@@ -22,7 +22,7 @@ std::atomic<long> allocations{0};
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 // These functions count every allocation of this program, including those of operator new and of
 // Eigen.
-extern "C" void* __libc_malloc(std::size_t size);  // NOLINT: of glibc
+extern "C" void* __libc_malloc(std::size_t size);  // NOLINT: a name of glibc
 extern "C" void* malloc(std::size_t size) noexcept {
   ++allocations;
   return __libc_malloc(size);
@@ -86,7 +86,7 @@ std::vector<Frame> Frames() {
 }
 
 void ExpectNoAllocation(Estimator& filter) {
-  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
+  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer makes allocations of its own";
   const std::vector<Frame> frames = Frames();
   for (std::size_t k = 0; k < 20; ++k) filter.Process(frames[k]);
   const long before = allocations;
@@ -134,8 +134,8 @@ TEST_P(Allocation, AStepOfTheUkfTakesNone) {
 INSTANTIATE_TEST_SUITE_P(Fuse, Allocation,
                          ::testing::Values(Fuse::kJoint, Fuse::kPerSensor, Fuse::kPerMeasurement));
 
-/// Adds `count` states that perform a random walk. If `considered`, the first of them is a consider
-/// state.
+/// Adds `count` states that perform a random walk. If `considered` is true, the first of these
+/// states is a consider state.
 void AddWalking(Problem& problem, int count, bool considered) {
   const SharedMotion model = testing::ConstantMotion(1, 0.1);
   for (int i = 0; i < count; ++i) {
@@ -158,11 +158,11 @@ std::vector<double> PixelOf(std::int64_t id, double x) {
   return {(3.0 * std::sin(angle) - x) / depth, 2.0 * std::cos(1.7 * angle) / depth};
 }
 
-/// Expects that frames with `measured` landmarks cause no allocations. There are 1.5 times as many
-/// landmarks. From frame to frame a tenth of the measured landmarks is replaced by others. One
-/// measurement of each frame is an outlier.
+/// Expects that frames with `measured` landmarks cause no allocations. The map contains 1.5 times
+/// as many landmarks. From one frame to the next, a tenth of the measured landmarks is replaced by
+/// others. One measurement of each frame is an outlier.
 void ExpectNoAllocationOf(Filter& filter, int measured) {
-  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
+  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer makes allocations of its own";
   const int known = measured * 3 / 2, change = measured / 10;
   std::vector<Frame> frames;
   for (int k = 0; k < 60; ++k) {
@@ -254,7 +254,7 @@ Problem ThirtyStates() {
 
 template <class Filter, class Options>
 void ExpectNoAllocationOfThirtyStates(const Options& options) {
-  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
+  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer makes allocations of its own";
   const Problem problem = ThirtyStates();
   Filter filter(problem, options, testing::StreamsOf(problem));
   std::vector<Frame> frames;

@@ -26,7 +26,7 @@ using testing::ManifoldSensor;
 using testing::ManifoldWalk;
 using testing::StreamsOf;
 
-/// Measures both blocks at once, each with the noise of ManifoldSensor.
+/// Measures both blocks at once. Each block is measured with the noise of ManifoldSensor.
 template <class A, class B>
 struct BothAtOnce : Sensor<Product<A, B>, A, B> {
   static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
@@ -46,8 +46,8 @@ struct BothAtOnce : Sensor<Product<A, B>, A, B> {
   }
 };
 
-/// Returns a problem with a block of geometry A and one of geometry B. Both blocks perform a random
-/// walk. Their priors are correlated.
+/// Returns a problem with a block of geometry A and a block of geometry B. Both blocks perform a
+/// random walk.
 template <class A, class B>
 Problem Walking() {
   Problem problem;
@@ -108,7 +108,7 @@ void ExpectBothAreTheTwo() {
       const UpdateReport& joint = other->Process(Frame{t, {{t, 0, -1, both, {}}}});
       ASSERT_EQ(joint.measurements()[0].outcome, Outcome::kAccepted);
       EXPECT_EQ(joint.measurements()[0].dof, A::kTangent + B::kTangent);
-      if (k == 0) {  // so far the blocks are uncorrelated
+      if (k == 0) {  // before the first update the blocks are uncorrelated
         EXPECT_NEAR(joint.measurements()[0].nis, nis, 1e-10);
       }
       for (std::size_t i = 0; i < one->state().values().size(); ++i) {

@@ -22,7 +22,7 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kFix = 0, kOdometry = 1;
-// kNoise is in m/s^0.5, kSigma in m.
+// kNoise is in m/s^0.5, and kSigma is in m.
 constexpr double kNoise = 0.2, kSigma = 0.3;
 
 const std::vector<StreamInfo> kStreams = {{"fix", 1}, {"odometry", 1}};
@@ -61,8 +61,8 @@ struct Gaussian {
   double x, p;
 };
 
-/// Kalman filter in closed form. The distance between two rows is the integral of u(t): the last
-/// speed until `timeout_s` after its row, then 0. P grows by kNoise^2 dt.
+/// Kalman filter in closed form. The displacement between two rows is the integral of u(t). The
+/// input u is the last speed until `timeout_s` after its row, and then 0. P grows by kNoise^2 dt.
 std::vector<Gaussian> WrittenOut(const std::vector<Seen>& drive, double timeout_s) {
   std::vector<Gaussian> estimates;
   double x = 1.0, p = 0.25, t = drive[0].t_s, speed = 0.0, since = t;
@@ -136,8 +136,8 @@ TEST(ControlInputs, StopActingInTheMiddleOfAStepWhenTheyAreTooOld) {
     ExpectWrittenOut(ukf, kDrive, 0.4, 1e-9);
   }
   Ekf ekf(Car(1.5), {}, kStreams);
-  // There is no input before the first one, and none acts from 4 s to 6.5 s. The second gap spans
-  // two frames but causes one event.
+  // No input acts before the first row with a speed, and none acts from 4 s to 6.5 s. The second
+  // gap spans two frames but causes only one event.
   EXPECT_EQ(ExpectWrittenOut(ekf, kDrive, 1.5, 1e-12), std::vector<std::string>(2, "input_stale"));
 }
 
@@ -148,7 +148,8 @@ TEST(ControlInputs, ActInEveryPartOfAGapThatIsSteppedInParts) {
     Ekf ekf(Car(timeout_s), options, kStreams);
     std::vector<std::string> kinds = ExpectWrittenOut(ekf, kDrive, timeout_s, 1e-12);
     std::erase(kinds, "input_stale");
-    // The gap of 0.5 s needs 5 parts. Only the gap of 3 s needs at least twice as many: 30.
+    // The gap of 0.5 s is divided into 5 parts. Only the gap of 3 s is divided into at least twice
+    // as many: 30.
     EXPECT_EQ(kinds, std::vector<std::string>(2, "substeps")) << timeout_s;
   }
   Ekf ekf(Car(), options, kStreams);
@@ -209,7 +210,7 @@ TEST(ControlInputs, ALateOneActsFromTheNextStepOnUnlessANewerOneIsHeld) {
   ekf.Process(FrameOf({0.0, kNone, 2.0}));
   ekf.Process(FrameOf({1.0, kNone, kNone}));
   EXPECT_TRUE(ekf.Process(FrameOf({0.5, 9.0, 4.0})).stale);
-  // The filter does not step a second time.
+  // The late frame does not repeat the step.
   EXPECT_NEAR(ValueOf(ekf.state(), "car.position"), 3.0, 1e-15);
   ekf.Process(FrameOf({2.0, kNone, 5.0}));
   EXPECT_NEAR(ValueOf(ekf.state(), "car.position"), 7.0, 1e-15);
@@ -258,8 +259,8 @@ TEST(ControlInputs, AFilterGoesBackToTheOneItHeld) {
   ExpectTheSameAfterGoingBack<Ukf>(UkfOptions{});
 }
 
-// With F = 1 the recursion of the smoother is x_s = x + C (x_s' - x'), P_s = P + C^2 (P_s' - P'), C
-// = P / P'.
+// With F = 1 the recursion of the smoother is
+// x_s = x + C (x_s' - x'), P_s = P + C^2 (P_s' - P'), C = P / P'.
 TEST(ControlInputs, DriveTheSmootherToo) {
   constexpr double kMaxAge = 0.4;
   RtsSmoother rts(Car(kMaxAge), {}, kStreams);
@@ -310,7 +311,7 @@ TEST(ControlInputs, OnAManifoldStartAtItsNeutralElementAndStayOnIt) {
   const UpdateReport& report = ekf.Process(frame(1.0, {2.0, 0.0, 0.0, 0.0}));
   EXPECT_NEAR(ValueOf(ekf.state(), "body.x"), 1.6, 1e-15);
   ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_NE(report.events[0].text.find("is not of unit length"), std::string::npos);
+  EXPECT_NE(report.events[0].text.find("does not have unit length"), std::string::npos);
   ekf.Process(frame(2.0, {1.0, 0.0, 0.0, 0.0}));
   EXPECT_NEAR(ValueOf(ekf.state(), "body.x"), 2.2, 1e-15);
 }

@@ -13,8 +13,8 @@ namespace {
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
 TEST(Ekf, UnderFirstEstimateTheJacobianOfAStationaryBlockIsThatOfItsStart) {
-  // 1/scale = lambda Z: dh/dZ is evaluated at the first estimate of lambda, and dh/dlambda at the
-  // current Z.
+  // 1/scale = lambda Z. dh/dZ is evaluated at the first estimate of lambda, and dh/dlambda is
+  // evaluated at the current Z.
   Problem problem = DepthFilter();
   problem.sensors.erase(problem.sensors.begin());
   EkfOptions options;
@@ -90,7 +90,7 @@ TEST(Ekf, AResetMakesANewFirstEstimate) {
   EXPECT_NEAR(next.measurements()[0].s[0], h * p * h.transpose() + sigma * sigma, 1e-12);
 }
 
-/// A direction that does not change.
+/// Motion model of a direction that does not change.
 struct StillDirection : Motion<0, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"u", "", "", "x,y,z"}};
   template <class T>

@@ -150,7 +150,7 @@ TEST(OnePointRansac, TestsAgainstTheSensorsNoiseWhateverTheLoss) {
   EXPECT_GT((PositionOf(plain) - PositionOf(told)).norm(), 5e-5);
 }
 
-// The threshold for the rescue of matches does not depend on the threshold for their support.
+// The threshold for rescuing a match does not depend on the threshold for supporting a hypothesis.
 TEST(OnePointRansac, RescuesByItsOwnThreshold) {
   const Frame frame = Matches({0.05, -0.03, 0.08}, 1000, 0.0);
   int rescued[2];
@@ -164,8 +164,8 @@ TEST(OnePointRansac, RescuesByItsOwnThreshold) {
   EXPECT_EQ(rescued[1], 0);
 }
 
-// Sensor `z` has no outlier rejection and no gate. Its measurement is used even if it is far from
-// the prediction.
+// Sensor `z` has no outlier rejection and no gate. The measurement of this sensor is used even if
+// it is far from the prediction.
 TEST(OnePointRansac, LeavesSensorsAloneThatDoNotAskForIt) {
   Problem problem = KnownMap();
   problem.sensors[0].outlier_rejection = OnePointRansac{};
@@ -234,9 +234,9 @@ TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
   }
 }
 
-// All points were initialised from one camera position, so they share its uncertainty. Sensor
-// `held` treats this position as known. All its points are shifted by 0.1 m: one match corrects
-// them all, and all matches agree.
+// All points were initialised from one camera position, so they share the uncertainty of this
+// position. Sensor `held` treats the position as known. All points of this sensor are shifted by
+// 0.1 m: one match corrects all of these points, and all matches agree.
 TEST(OnePointRansac, AHypothesisIsSeenFromWhereARoleIsHeld) {
   Problem problem = MapSystem(Offset(0.01), {}, 0.3);
   SensorBinding held = problem.sensors[0];

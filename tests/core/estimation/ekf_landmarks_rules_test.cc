@@ -12,8 +12,8 @@
 namespace alidade::testing {
 namespace {
 
-/// Returns the problem with a second sensor, which measures its landmarks on the same stream. The
-/// second sensor comes first.
+/// Returns the problem with a second sensor, which comes first. The second sensor measures its
+/// landmarks on the same stream.
 Problem WithTwoSensors(Problem problem) {
   SensorBinding second = problem.sensors[0];
   second.name = "second";
@@ -89,7 +89,7 @@ TEST(Landmarks, ThatHaveToWaitTakeNoMemory) {
   EXPECT_LE(p.lower().outerStride(), 2 * p.size());
 }
 
-// Fault 39 of tests/faults/README.md.
+// Tests fault 39 of tests/faults/README.md.
 TEST(Landmarks, AnIdThatComesBackIsTheNextGeneration) {
   LandmarkOptions options;
   options.max_missed_frames = 2;
@@ -158,7 +158,7 @@ TEST(Landmarks, ThatFailTooOftenAreForgotten) {
   EXPECT_EQ(ekf.landmarks()[0].accepted, 4);
 }
 
-// Fault 83 of tests/faults/README.md.
+// Tests fault 83 of tests/faults/README.md.
 TEST(Landmarks, OfNegativeDepthAreCountedAndDeletedWhereAsked) {
   using enum LandmarkOptions::NegativeDepth;
   for (const auto policy : {kKeep, kDelete}) {
@@ -168,9 +168,9 @@ TEST(Landmarks, OfNegativeDepthAreCountedAndDeletedWhereAsked) {
     Ekf ekf = EkfOf(MapSystem(InverseDepthPixels(0.001), options));
     LandmarkCounts counts;
     for (int k = 0; k < 6; ++k) {
-      // The camera moves right, and so does the image of landmark 7, so its inverse depth is
-      // negative. Its predicted pixel does not move. The first step thus gives no information on
-      // its depth: H = rho (a - r) + m.
+      // The camera moves right. The image of landmark 7 also moves right, so the inverse depth of
+      // this landmark is negative. The predicted pixel does not move, so the first step gives no
+      // information on the depth: H = rho (a - r) + m.
       const double x = 0.1 * k;
       const UpdateReport& report = ekf.Process(FrameOf(
           0.1 * k, {{1, {-x / 2.0, 0.0}}, {2, {(1.0 - x) / 2.0, 0.0}}, {7, {0.02 * k, 0.0}}}));
@@ -309,7 +309,7 @@ TEST(Landmarks, AreNotCorrelatedWithWhatTheirSensorHolds) {
   problem.sensors[0].roles[0].mode = RoleMode::kKnown;
   Ekf ekf(problem, {}, {{"tracks", 3}});
   ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}}));
-  // Only R counts. With the uncertainty of the camera the variance would be 0.1^2 + 0.3^2.
+  // The variance consists of R only. With the uncertainty of the camera it would be 0.1^2 + 0.3^2.
   EXPECT_NEAR(ekf.landmarks().at(0).covariance(0, 0), 0.01, 1e-12);
 }
 
@@ -354,8 +354,8 @@ struct HeldWalk : Walk {
   NoiseKind noise_kind() const { return NoiseKind::kDiscrete; }
 };
 
-// At 0.1 s only a landmark that is not yet initialised is measured. So the noise interval lasts
-// until 0.2 s. This also holds if another landmark is pruned at 0.1 s.
+// At 0.1 s only a landmark that is not yet initialised is measured, so the noise interval lasts
+// until 0.2 s. The pruning of another landmark at 0.1 s does not change this interval.
 TEST(Landmarks, ThatArePrunedDoNotEndAnIntervalOfHeldNoise) {
   const auto camera = [](int max_missed_frames) {
     LandmarkOptions options;

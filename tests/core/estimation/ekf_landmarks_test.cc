@@ -282,8 +282,8 @@ TEST(Landmarks, ThatComeAndGoKeepStateAndLayoutSmall) {
   }
   EXPECT_GT(converted, 1000);
   // A landmark remains for two frames after it has left the view, so there are at most 12
-  // landmarks. Each has at most three blocks, 6 rows and 7 values. While a landmark is initialised,
-  // there is one more.
+  // landmarks. Each has at most three blocks, 6 rows and 7 values. During an initialisation there
+  // is one additional landmark.
   EXPECT_LE(ekf.landmarks().size(), std::size_t{kInView + 2});
   EXPECT_LE(most_rows, 3 + 6 * (kInView + 3));
   EXPECT_LE(blocks, std::size_t{1 + 3 * (kInView + 3) + 1});
@@ -318,7 +318,7 @@ TEST(Landmarks, KnownOnesStartAsXyzAndStay) {
   EXPECT_TRUE(IsPoint(landmarks[1]));
 }
 
-// Fault 41 of tests/faults/README.md.
+// Tests fault 41 of tests/faults/README.md.
 TEST(Landmarks, BehindTheCameraAreOutOfDomainAndNoDivergence) {
   Ekf ekf = EkfOf([] {
     LandmarkOptions options = WithPrior();

@@ -13,7 +13,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-// Fault 76 of tests/faults/README.md.
+// Tests fault 76 of tests/faults/README.md.
 TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 7.0, 1.0}});
@@ -29,7 +29,7 @@ TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
   EXPECT_FALSE(ekf.failed());
 }
 
-/// The value overflows in the first step.
+/// Motion model whose value overflows in the first step.
 struct Exploding : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -39,7 +39,7 @@ struct Exploding : Motion<1, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
-// Fault 76 of tests/faults/README.md.
+// Tests fault 76 of tests/faults/README.md.
 TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
   Problem problem;
   AddMotion(problem, "p", MakeMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
@@ -96,7 +96,7 @@ TEST(Ekf, AFailedStepMovesNothing) {
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
 }
 
-// Fault 38 of tests/faults/README.md.
+// Tests fault 38 of tests/faults/README.md.
 TEST(Ekf, AGapOfTooManyPartsIsGivenUpNotSkipped) {
   EkfOptions options;
   options.max_dt_s = 1e-9;
@@ -129,8 +129,8 @@ TEST(Ekf, NumbersThatAreNoneDoNotLockASensorOut) {
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
 }
 
-// An invalid covariance also does not count as a rejection. It is a fault of the measurement, not
-// of the filter.
+// An invalid covariance is a fault of the measurement, not of the filter. It therefore does not
+// count as a rejection.
 TEST(Ekf, CovariancesThatAreNoneDoNotLockASensorOut) {
   const Problem problem = DepthFilter();
   for (const double variance : {std::nan(""), -1e6}) {
@@ -166,8 +166,8 @@ struct OfSum : Sensor<Vec<2>, Vec<1>> {
   }
 };
 
-// If S is not positive definite, the measurement counts as rejected, like one outside the gate. So
-// the covariance of the sensor's blocks is increased.
+// If S is not positive definite, the measurement counts as rejected, like a measurement outside the
+// gate. So the covariance of the sensor's blocks is increased.
 TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
@@ -185,7 +185,7 @@ TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
   EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 100.0, 1e-9);
 }
 
-// Fault 77 of tests/faults/README.md.
+// Tests fault 77 of tests/faults/README.md.
 TEST(Ekf, ASensorThatStaysOutOfItsDomainInflatesOnceAndNotWhatItHolds) {
   Problem problem = DepthFilter();
   problem.sensors.erase(problem.sensors.begin());
@@ -206,7 +206,7 @@ TEST(Ekf, AMeasurementThatIsNotFiniteIsNotUsed) {
   EXPECT_EQ(ValueOf(ekf.state(), "target.depth"), 0.35);
 }
 
-// Fault 77 of tests/faults/README.md.
+// Tests fault 77 of tests/faults/README.md.
 TEST(Ekf, ASensorThatIsRejectedRepeatedlyResetsItsBlockFromTheMeasurement) {
   Problem problem = DepthFilter();
   problem.priors[0].mean = {3.0};
@@ -270,7 +270,8 @@ TYPED_TEST(WithoutRecovery, LeavesTheCovarianceAsItIs) {
   EXPECT_LT((filter.state().covariance().Dense() - p).norm(), 1e-12);
 }
 
-/// Motion model x' = x + w for each of the two blocks. Their noises are independent.
+/// Motion model x' = x + w for each of the two blocks. The noises of the two blocks are
+/// independent.
 struct Pair : Motion<2, Vec<1>, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"a"}, Quantity{"b"}};
   template <class T>
@@ -302,8 +303,8 @@ struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-// Block b is reset to z - a. Block a has the same motion model, so it is first reset to its prior.
-// Afterwards b is correlated with a.
+// Block b is reset to z - a. Block a has the same motion model, so a is first reset to its prior.
+// After both resets, b is correlated with a.
 TEST(Ekf, ABlockThatIsResetIsCorrelatedWithWhatItWasResetFrom) {
   Problem problem;
   AddMotion(problem, "p", MakeMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 1e-3}});

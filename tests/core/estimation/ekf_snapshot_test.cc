@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests that a copy of a filter also contains what the filter remembers: which one-time warnings
-// were given, and the last measurement.
+// Tests that a copy of a filter also contains the history of the filter: the one-time warnings that
+// were already issued, and the last measurement.
 #include <algorithm>
 #include <limits>
 
@@ -10,7 +10,8 @@
 namespace alidade::testing {
 namespace {
 
-/// The state does not change in steps of up to one second. In longer steps it is not finite.
+/// Motion model whose state does not change in steps of up to one second. In longer steps the state
+/// is not finite.
 struct Breaking : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>

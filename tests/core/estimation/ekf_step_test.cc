@@ -14,9 +14,9 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Returns the variance of the velocity after a gap of `gap` ns, in steps of at most `max_dt_s`.
-/// The acceleration is constant within each step, so n steps add gap^2 / n to the prior variance of
-/// 9.
+/// Returns the variance of the velocity after a gap of `gap` ns that is divided into steps of at
+/// most `max_dt_s`. The acceleration is constant within each step, so n steps add gap^2 / n to the
+/// prior variance of 9.
 double VelocityVarianceAfter(Timestamp gap, double max_dt_s) {
   EkfOptions options;
   options.max_dt_s = max_dt_s;
@@ -30,7 +30,7 @@ double VelocityVarianceAfter(Timestamp gap, double max_dt_s) {
 }
 
 TEST(EkfStep, AGapOfTheLongestStepIsOnePart) {
-  // Because of rounding 3e7 * 1e-9 is above 0.03.
+  // Because of rounding, 3e7 * 1e-9 is above 0.03.
   EXPECT_NEAR(VelocityVarianceAfter(30'000'000, 0.03) - 9.0, 9e-4, 1e-13);
   EXPECT_NEAR(VelocityVarianceAfter(90'000'000, 0.03) - 9.0, 81e-4 / 3.0, 1e-13);
   EXPECT_NEAR(VelocityVarianceAfter(30'000'001, 0.03) - 9.0, 9e-4 / 2.0, 1e-9);
@@ -41,7 +41,7 @@ TEST(EkfStep, TheLongestStepMayBeOfAnySize) {
   for (const double longest : {infinity, 1e300, 1e10, 9.3e9}) {
     EXPECT_NEAR(VelocityVarianceAfter(2'000'000'000, longest), 9.0 + 4.0, 1e-12) << longest;
   }
-  // Timestamps are whole nanoseconds, so steps are too.
+  // Timestamps are whole nanoseconds, so the length of a step is a whole number of nanoseconds.
   EXPECT_NEAR(VelocityVarianceAfter(4, 1e-12) - 9.0, 0.0, 1e-12);
 }
 
@@ -72,7 +72,7 @@ TEST(EkfStep, ACovarianceThatOverflowsLeavesStateAndCovarianceAsTheyWere) {
 }
 
 TEST(EkfStep, ACovarianceCloseToTheLargestNumberStillSteps) {
-  // 1e20 * 1e287 is finite. The bound that decides if a backup copy is needed overflows.
+  // 1e20 * 1e287 is finite. The bound that decides whether a backup copy is needed overflows.
   Problem problem;
   AddMotion(problem, "q", MakeMotion(Stretching(), "stretching"), {{"x", 1.0, std::sqrt(1e287)}});
   Ekf ekf(problem, {}, {});
@@ -82,8 +82,8 @@ TEST(EkfStep, ACovarianceCloseToTheLargestNumberStillSteps) {
   EXPECT_NEAR(CovarianceOf(ekf.state(), "q.x", "q.x") / 1e307, 1.0, 1e-12);
 }
 
-/// The angle grows by 1 rad in each step. The quaternion rotates about z, and its norm grows by
-/// 0.1 % in each step.
+/// Motion model of an angle that grows by 1 rad in each step, and of a quaternion that rotates
+/// about z. The norm of the quaternion grows by 0.1 % in each step.
 struct TurningBlocks : Motion<0, Angle, UnitQuaternion> {
   static constexpr std::array kBlocks{Quantity{"a", "rad"}, Quantity{"q"}};
   template <class T>
@@ -165,7 +165,7 @@ struct Unwrapped : Opposite {
   }
 };
 
-// Fault 84 of tests/faults/README.md.
+// Tests fault 84 of tests/faults/README.md.
 TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
   Problem problem = Turn();
   AddSensor(problem, "unwrapped", MakeSensor(Unwrapped(), "unwrapped"), {"t.a"});
@@ -179,8 +179,8 @@ TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
   }
 }
 
-// Fault 84 of tests/faults/README.md: 3 and -3 rad are 0.28 rad apart, and the update uses the
-// shorter direction.
+// Tests fault 84 of tests/faults/README.md: 3 and -3 rad are 0.28 rad apart, and the update uses
+// the shorter direction.
 TEST(EkfStep, AnInnovationOfAnAngleTakesTheShortWay) {
   Problem problem = Turn();
   AddSensor(problem, "opposite", MakeSensor(Opposite(), "opposite"), {"t.a"});
@@ -200,8 +200,8 @@ TEST(EkfStep, AnInnovationOfAnAngleTakesTheShortWay) {
   }
 }
 
-// The event is reported for the first gap that takes several steps. After that it is reported for
-// each gap that takes at least twice as many.
+// The event is reported for the first gap that takes several steps. Afterwards it is reported only
+// for a gap that takes at least twice as many steps as the last reported gap.
 TEST(Ekf, AGapInPartsIsNotedWhereItTakesTwiceAsManyAsBefore) {
   EkfOptions options;
   options.max_dt_s = 0.1;

@@ -88,7 +88,7 @@ TEST(Ekf, JointEqualsSequentialOnALinearProblem) {
   }
 }
 
-// Fault 80 of tests/faults/README.md.
+// Tests fault 80 of tests/faults/README.md.
 TEST(Ekf, AnOutlierIsGatedAndLeavesStateAndCovarianceBitForBit) {
   const Problem problem = DepthFilter();
   EkfOptions options;
@@ -120,7 +120,7 @@ TEST(Ekf, TheGatePassesTheShareThatItsProbabilityStates) {
     const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, random.Normal()}}));
     passed += report.measurements()[0].outcome == Outcome::kAccepted ? 1 : 0;
   }
-  // The tolerance is 5 sigma of a binomial share.
+  // The tolerance is 5 sigma of a binomial proportion.
   EXPECT_NEAR(passed / double{kTrials}, 0.9, 5.0 * std::sqrt(0.9 * 0.1 / kTrials));
 }
 
@@ -218,7 +218,7 @@ struct Implies : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-// A measurement that implies no state is invalid. This is not a divergence of the filter.
+// A measurement that implies no state is invalid. It does not count as a divergence of the filter.
 TEST(Ekf, AMeasurementThatImpliesNoValueToLineariseAtIsInvalid) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.0, 1.0}});
@@ -234,8 +234,8 @@ TEST(Ekf, AMeasurementThatImpliesNoValueToLineariseAtIsInvalid) {
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 1.5}})).measurements()[0].outcome, Outcome::kAccepted);
 }
 
-// A quaternion has three degrees of freedom, so the gate is chi2(0.95, 3) = 7.81. With four numbers
-// it would be chi2(0.95, 4) = 9.49.
+// A quaternion has three degrees of freedom, so the gate is chi2(0.95, 3) = 7.81. If the gate
+// counted the four elements, it would be chi2(0.95, 4) = 9.49.
 TEST(Ekf, TheGateCountsDegreesOfFreedomNotNumbers) {
   const Problem problem = WalkingOrientation();
   EkfOptions options;
@@ -261,7 +261,7 @@ TEST(Ekf, ConsideredBlocksKeepTheirValueAndTheirCorrelationsFollowSchmidt) {
   ekf.Start(0);
   ekf.Process(FrameAt(0.0, {{0, 1.1}}));
   const double z = 0.35, lambda = 3.3, h = z * lambda;
-  // The elements are depth, depth_rate and inverse_distance.
+  // The elements of the state are depth, depth_rate and inverse_distance.
   const Eigen::RowVector3d jacobian(lambda, 0.0, z);
   const Eigen::Matrix3d p = Eigen::Vector3d(0.01, 0.25, 0.25).asDiagonal();
   const double sigma = 2.0 / 300.0 * h * h * h, r = sigma * sigma;
@@ -318,7 +318,7 @@ TEST(Ekf, ASensorOutsideItsDomainIsReportedAsDivergenceOnce) {
   EXPECT_EQ(ValueOf(ekf.state(), "target.depth"), -0.2);
 }
 
-// Fault 73 of tests/faults/README.md.
+// Tests fault 73 of tests/faults/README.md.
 TEST(Ekf, NoiseThatVanishesIsWarnedOfOnce) {
   Problem problem = MovingPoint();
   AddSensor(problem, "direct", LinearSensor(1.0, 1e-200), {"p.x"});
@@ -357,13 +357,13 @@ TEST(Ekf, StaleFramesInARowAreOneEvent) {
       std::vector<std::string>{
           "the frame at 0.500000 s is older than the state at 1.000000 s: the measurements of "
           "this frame are not used; to use late frames, set `out_of_sequence: {policy: "
-          "rollback, ...}` or, in C++, alidade::Rollback"});
+          "rollback, ...}`, or use alidade::Rollback in C++"});
   EXPECT_EQ(stale(0.6), none);  // this frame belongs to the same episode
   EXPECT_EQ(stale(1.1), none);
   EXPECT_EQ(stale(1.0).size(), 1u);
 }
 
-// Fault 38 of tests/faults/README.md.
+// Tests fault 38 of tests/faults/README.md.
 TEST(Ekf, AGapIsSteppedInEqualParts) {
   EkfOptions options;
   options.max_dt_s = 0.3;
@@ -408,7 +408,8 @@ struct Product : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-// z = x^2 at x = 2: H = (4, 0) and S = 17. The number of roles equals the number of states.
+// The sensor measures z = x^2 at x = 2, so H = (4, 0) and S = 17. The number of roles equals the
+// number of states.
 TEST(Ekf, TwoRolesOfOneBlockAddUpInItsColumn) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 2.0, 1.0}});
@@ -444,8 +445,8 @@ struct OffsetOf : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-// p ~ N(0, 4), r ~ N(0, 1) and z = 6: S = 6, so p = 4 and r = -1. The blocks and the roles have
-// different orders.
+// With p ~ N(0, 4), r ~ N(0, 1) and z = 6, S = 6, so p = 4 and r = -1. The blocks and the roles
+// have different orders.
 TEST(Ekf, ASensorOfLandmarksMayReadBlocksInAnyOrder) {
   Problem problem;
   AddMotion(problem, "map", testing::ConstantMotion(1), {{"p", 0.0, 2.0}});

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests live use of a filter: measurements pushed by name, predictions that do not change the
-// filter, and copies.
+// Tests the live use of a filter: measurements added by the name of their sensor, predictions that
+// do not change the filter, and copies.
 #include "alidade/estimation/filter.h"
 
 #include <gtest/gtest.h>
@@ -111,7 +111,7 @@ TYPED_TEST(Live, AtIsWhereAFrameWithoutMeasurementsLeads) {
     ExpectSame(at, run.state());
     EXPECT_NE(at.covariance().Dense(), before.covariance().Dense());
   }
-  ExpectSame(filter.At(0), filter.state());  // for a past time At returns the current state
+  ExpectSame(filter.At(0), filter.state());  // At returns the current state for a past time
 }
 
 // Runs 250 random sequences for each type of filter.
@@ -180,8 +180,8 @@ TYPED_TEST(Live, ExpectsOfEachLandmarkWhatItExpectsOfItAlone) {
   EXPECT_THROW(filter.ExpectEach("stereo", later, {-1}), Error);
 }
 
-// The expected pixels are those in the camera at its predicted position. A landmark that is not in
-// the map has no expected pixel.
+// The expected pixels are computed for the predicted position of the camera. A landmark that is not
+// in the map has no expected pixel.
 TEST(Live, ExpectsOfEachLandmarkOfTheMapItsOwn) {
   Ekf ekf = EkfOf(MapSystem(InverseDepthPixels(0.01), WithPrior()));
   ekf.Process(FrameOf(0.0, {{3, {0.1, 0.2}}, {8, {-0.3, 0.0}}, {5, {0.0, -0.1}}}));
@@ -219,12 +219,12 @@ TEST(Live, NamesAreThoseOfTheConfigAndAWrongOneIsAnErrorThatListsThem) {
     return "";
   };
   EXPECT_EQ(text([&] { ekf.stream("disparty"); }),
-            "no stream 'disparty'; expected disparity, inverse_scale");
+            "the problem has no stream 'disparty'; expected disparity, inverse_scale");
   EXPECT_EQ(text([&] { ekf.block("depth"); }),
-            "no block 'depth'; expected target.depth, target.depth_rate, "
+            "the problem has no block 'depth'; expected target.depth, target.depth_rate, "
             "template.inverse_distance");
   EXPECT_EQ(text([&] { ekf.Expect("stereo", 0); }),
-            "no sensor 'stereo'; expected disparity, inverse_scale");
+            "the problem has no sensor 'stereo'; expected disparity, inverse_scale");
 }
 
 TEST(Live, AReadingThatNoSensorTakesIsAnErrorAndChangesNothing) {
@@ -347,14 +347,14 @@ TEST(Live, ExpectsALandmarkByItsId) {
   const auto seen = ekf.Expect("tracks", 0, 7);
   ASSERT_TRUE(seen);
   EXPECT_NEAR(seen->z[2], 1.0, 1e-12);
-  // The landmark was initialised from a measurement with the same noise. So S = 2 R, and it does
-  // not depend on the P of the camera.
+  // The landmark was initialised from a measurement with the same noise, so S = 2 R. S does not
+  // depend on the P of the camera.
   EXPECT_NEAR(seen->s(0, 0), 2.0 * 0.1 * 0.1, 1e-12);
   EXPECT_FALSE(ekf.Expect("tracks", 0, 8));
   EXPECT_FALSE(ekf.Expect("tracks", 0));
 }
 
-// With the thread sanitizer this test detects data races.
+// If this test runs with the thread sanitizer, it detects data races.
 TEST(Live, ThreadsMayAskOneFilterAtOnceAndMoveTheirOwnCopies) {
   Ekf ekf = MakeLive<Ekf>();
   const std::vector<Frame> frames = Swinging(30, 5);

@@ -26,7 +26,6 @@ struct Options {
   double gate = 1.0;
 };
 
-/// Returns a filter of the type Filter.
 template <class Filter>
 std::unique_ptr<Filter> Make(const Problem& problem, const Options& options,
                              const std::vector<StreamInfo>& streams) {
@@ -42,8 +41,8 @@ std::unique_ptr<Filter> Make(const Problem& problem, const Options& options,
   }
 }
 
-/// Returns the largest difference of values and of covariances. A difference of covariances is
-/// divided by the standard deviations.
+/// Returns the largest difference between the values or the covariances of two states. A difference
+/// of covariances is divided by the standard deviations.
 double Apart(const State& a, const State& b) {
   double most = 0.0;
   for (std::size_t i = 0; i < a.values().size(); ++i) {
@@ -87,8 +86,8 @@ std::vector<Frame> WithEmptyFrames(const std::vector<Frame>& frames, int parts) 
   return all;
 }
 
-/// Returns the states after the frames that have a measurement. For a smoother these are the
-/// smoothed states.
+/// Returns the states after the frames that have a measurement. A smoother returns its smoothed
+/// states.
 std::vector<State> StatesOf(Estimator& filter, const std::vector<Frame>& frames) {
   std::vector<State> states;
   for (const Frame& frame : frames) {
@@ -117,8 +116,8 @@ class HeldNoise : public ::testing::Test {
                                 const Options& options = {}) {
     return StatesOf(*Make<Filter>(problem, options, StreamsOf(problem)), frames);
   }
-  /// Tolerance for rounding errors. With sigma points they grow with eps / alpha^2, and alpha
-  /// = 0.01. In the smoother they grow with P / P_s, which is up to 1e4 here.
+  /// Tolerance for rounding errors. With sigma points, rounding errors grow with eps / alpha^2, and
+  /// alpha is 0.01. In the smoother they grow with P / P_s, which is up to 1e4 here.
   static constexpr bool kCancels =
       std::is_same_v<Filter, Ukf> || std::is_same_v<Filter, RtsSmoother>;
   static constexpr double kTolerance = kCancels ? 1e-9 : 1e-11;
@@ -143,7 +142,8 @@ TYPED_TEST(HeldNoise, FramesWithoutMeasurementsChangeNothing) {
   EXPECT_LT(MostApart(whole, this->Run(DepthFilter(), more, {0.001})), this->kTolerance);
 }
 
-// Rejected measurements change no estimate: the result is the same without them.
+// Rejected measurements change no estimate: the result is the same if they are removed from the
+// data.
 TYPED_TEST(HeldNoise, RejectedMeasurementsAreNone) {
   const Problem problem = DepthFilter();
   std::vector<Frame> frames = DepthFrames(), wild;
@@ -160,8 +160,8 @@ TYPED_TEST(HeldNoise, RejectedMeasurementsAreNone) {
   EXPECT_LT(MostApart(this->Run(problem, frames, {.gate = 1.0 - 1e-6}), states), this->kTolerance);
 }
 
-// The problem has two motion models: one with discrete noise, and one whose noise is independent
-// from step to step.
+// The problem has two motion models. One has discrete noise, and the noise of the other is
+// independent from step to step.
 TYPED_TEST(HeldNoise, StandsBesideNoiseThatAddsUp) {
   Problem problem = DepthFilter();
   problem.motions[1].model = testing::ConstantMotion(1, 0.3);
@@ -180,7 +180,7 @@ TYPED_TEST(HeldNoise, ContinuousNoiseAddsUp) {
   EXPECT_LT(MostApart(whole, this->Run(problem, more)), this->kTolerance);
 }
 
-/// Constant velocity with a control input that has no effect.
+/// Constant-velocity motion model with a control input that has no effect.
 struct Pushed : Motion<1, Vec<1>, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"depth", "m"}, Quantity{"depth_rate", "m/s"}};
   using Input = Vec<1>;
@@ -272,8 +272,8 @@ TYPED_TEST(HeldNoiseSnapshot, IsHeldOverTheWholeGap) {
   EXPECT_NEAR(CovarianceOf(filter->state(), "p.x", "p.x"), 4.0 + 9.0 + 0.25, 1e-9);
 }
 
-// The initialisation of a block ends the noise interval. An update without information does the
-// same.
+// The initialisation of a block ends the noise interval. An update without information also ends
+// the noise interval.
 TEST(HeldNoiseOfAFirstValue, IsHeldAnewAfterIt) {
   Problem waits = DepthFilter();
   waits.priors[2] = {2, {}, {}, "inverse_scale"};
@@ -296,8 +296,8 @@ TEST(HeldNoiseOfAFirstValue, IsHeldAnewAfterIt) {
   EXPECT_GT(std::abs(covariance(starts) - covariance(goes_on)), 1e-3);
 }
 
-// Least squares over x_k = Phi_k x_0 + sum Gamma w. There is one w for each interval between
-// measured frames.
+// The expected values are the least-squares solution of x_k = Phi_k x_0 + sum Gamma w. There is one
+// w for each interval between measured frames.
 TEST(HeldNoiseSmoother, EqualsTheBatchAtFramesInsideAGap) {
   constexpr int kFrames = 40;
   constexpr double kDt = 0.05, kSigma = 0.7;

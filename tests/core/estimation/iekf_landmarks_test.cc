@@ -96,7 +96,7 @@ TEST(IekfLandmarks, AnUpdateEndsWhereItsCostIsLeast) {
   ASSERT_EQ(prediction.state().layout().blocks().size(), 4u);
   const double before = cost.Gradient(VectorXd::Zero(cost.From(iekf.state()).size())).norm();
   EXPECT_LT(cost.Gradient(cost.From(iekf.state())).norm(), 1e-4 * before);
-  // A single step is not enough.
+  // The single step of the EKF does not reach the minimum.
   EXPECT_GT(cost.Gradient(cost.From(ekf.state())).norm(), 1e-2 * before);
 }
 

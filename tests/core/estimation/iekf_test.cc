@@ -138,7 +138,7 @@ Problem FarArcTangent() {
   return problem;
 }
 
-// Fault 81 of tests/faults/README.md: the filter uses the iterate with the lowest cost.
+// Tests fault 81 of tests/faults/README.md: the filter uses the iterate with the lowest cost.
 TEST(Iekf, HalvesAStepThatWouldRaiseTheCost) {
   // A full Gauss-Newton step from 3 leads to -9.5, the next step leads to 116, and so on.
   const Problem problem = FarArcTangent();
@@ -148,7 +148,7 @@ TEST(Iekf, HalvesAStepThatWouldRaiseTheCost) {
   EXPECT_NEAR(ValueOf(iekf.state(), "p.x"), 0.0, 1e-6);
 }
 
-// Fault 81 of tests/faults/README.md.
+// Tests fault 81 of tests/faults/README.md.
 TEST(Iekf, AnUpdateThatDoesNotConvergeKeepsTheLastIterateAndSaysSo) {
   const Problem problem = FarArcTangent();
   IekfOptions options;
@@ -204,7 +204,7 @@ TEST(Iekf, LinearisesAnUpdateNoMoreOftenThanItMay) {
   }
 }
 
-// The first step leads from 2.5 to 1.34. There h is defined, but its derivative is not.
+// The first step leads from 2.5 to 1.34. At 1.34, h is defined, but the derivative of h is not.
 TEST(Iekf, AnIterateThatCannotBeLinearisedIsTheLast) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 2.5, 1.0}});
@@ -297,8 +297,8 @@ TEST(Iekf, FindsTheMostProbableRotationAndDirection) {
   const double z[3] = {-0.3, 0.9, 0.2};
   frame.measurements.push_back({0, 0, -1, {z[0], z[1], z[2]}, {}});
   EXPECT_TRUE(iekf.Process(frame).events.empty());
-  // At the estimate the gradient of the cost must be zero. It is taken with respect to the tangent
-  // at the prior.
+  // At the estimate, the gradient of the cost with respect to the tangent at the prior must be
+  // zero.
   const Geometry geometries[2] = {Geometry::UnitQuaternion(), Geometry::UnitVector()};
   double d[5];
   geometries[0].Minus(iekf.state().value(0), problem.priors[0].mean.data(), d);
@@ -363,8 +363,8 @@ struct PowerTimes : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-/// Measures z = x - c + n. The update changes P = 1.9 I to P = [[1, .9], [.9, 1]], with .9
-/// = 1.9^2 / S.
+/// Measures z = x - c + n. The update changes P = 1.9 I to P = [[1, .9], [.9, 1]], because 1.9^2 /
+/// S = .9.
 struct Difference : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}, Quantity{"c"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -380,7 +380,7 @@ struct Difference : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 };
 
 /// Returns the state after the measurement z = 2 = x^k c with R = .01. The sensor treats c as
-/// known. Before this measurement x = c = 1, correlated by an update with Difference.
+/// known. Before this measurement x = c = 1, and an update with Difference has correlated x and c.
 State AfterAHeldRole(int power) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.0, std::sqrt(1.9)}});

@@ -80,8 +80,8 @@ TEST(UnobservableDirections, AreNotLookedForInALargeState) {
   EXPECT_TRUE(UnobservableDirections(state_of(501)).empty());
 }
 
-// Fault 78 of tests/faults/README.md: a single camera without other motion or sensor information
-// cannot determine the scale of the world.
+// Tests fault 78 of tests/faults/README.md: a single camera without other motion or sensor
+// information cannot determine the scale of the world.
 TEST(UnobservableDirections, OneCameraCannotTellScale) {
   const auto problem = [](const LandmarkOptions& options) {
     return testing::MapSystem(testing::InverseDepthPixels(0.01), options);
@@ -98,8 +98,8 @@ TEST(UnobservableDirections, OneCameraCannotTellScale) {
   EXPECT_TRUE(UnobservableDirections(testing::MapSystem(testing::Offset(0.1), {})).empty());
 }
 
-// Fault 78 of tests/faults/README.md: the initial position of the camera is also unknown, so the
-// whole world may be shifted.
+// Tests fault 78 of tests/faults/README.md: the initial position of the camera is also unknown, so
+// a shift of the whole world is unobservable.
 TEST(UnobservableDirections, WithoutAFirstPositionTheWorldIsAnywhere) {
   const Problem problem =
       testing::MapSystem(testing::InverseDepthPixels(0.01), testing::WithPrior(), 0.5);
@@ -121,8 +121,8 @@ BlockId AddBlock(Problem& problem, const std::string& name, const Space& space,
   return id;
 }
 
-/// Returns a body `b` driven by its accelerometer, with a sensor of the block `measured`, its
-/// position or velocity.
+/// Returns a body `b` driven by its accelerometer. A sensor measures the block `measured`, which is
+/// the position or the velocity of the body.
 Problem Accelerated(const std::string& measured) {
   Problem problem;
   const SharedMotion model = MakeMotion(testing::Accelerated(), "accelerated");
@@ -168,13 +168,13 @@ Problem CarWithMast() {
   return problem;
 }
 
-// On a circle all circles with the same centre explain the data: these are 4 numbers for 5
-// unknowns.
+// If the odometry were constant, the receiver would move on a circle. The centre, the radius and
+// the phase of this circle are 4 numbers, too few for the 5 unknowns.
 TEST(UnobservableDirections, OdometryThatChangesTellsALeverArm) {
   EXPECT_EQ(UnobservableDirections(CarWithMast()), std::vector<Names>{});
 }
 
-/// A motion model with four blocks. Each block is the derivative of the previous one.
+/// Motion model with four blocks. Each block is the derivative of the previous one.
 struct Chain : Motion<1, Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}, Quantity{"v"}, Quantity{"a"}, Quantity{"j"}};
   template <class T>
@@ -189,7 +189,7 @@ struct Chain : Motion<1, Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
 };
 
 // In three steps of 0.02 s the jerk j moves x by j (0.02 s)^3. If j has sigma 0.01 m/s^3 and the
-// position 1 m, this is 8e-8 sigma: small, but above rounding.
+// position 1 m, this shift is 8e-8 sigma of the position: small, but above rounding.
 TEST(UnobservableDirections, AThirdDerivativeIsSeen) {
   Problem problem;
   testing::AddMotion(problem, "p", MakeMotion(Chain(), "chain"),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests that problems built in code equal those of a config, and that invalid problems are rejected
-// with a message.
+// Tests that a problem built in code equals the problem read from a config, and that invalid
+// problems are rejected with a message.
 #include <gtest/gtest.h>
 
 #include "alidade/base/error.h"
@@ -152,15 +152,15 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Point(1.0), {{"position", 0.0, 1.0}});
             }),
-            "state 'b': no initial value of 'velocity'; expected one");
+            "state 'b': block 'velocity' has no initial value; expected one");
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Point(1.0), {{"depth", 0.0, 1.0}, {"velocity", 0.0, 1.0}});
             }),
-            "state 'b': no block 'depth'; expected position, velocity");
+            "state 'b': the model has no block 'depth'; expected position, velocity");
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Constant<3>(3), {{"value", {0.0, 1.0}, 1.0}});
             }),
-            "state 'b': the initial value of 'value', a vector(3), has 2 numbers; expected 3");
+            "state 'b': the initial value of 'value', a vector(3), has the size 2; expected 3");
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Constant<1>(1), {{"value", 0.0, -1.0}});
             }),
@@ -169,7 +169,7 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Constant<1>(1), {{"value", 0.0, 1.0}, {"value", 1.0, 1.0}});
             }),
-            "state 'b': two initial values of 'value'; expected only one");
+            "state 'b': block 'value' has several initial values; expected one");
   EXPECT_EQ(
       Refusal([](Problem& p, auto&) {
         p.AddState("b", Constant<3>(3),
@@ -182,25 +182,26 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   EXPECT_EQ(Refusal([&](Problem& p, auto& t) {
               p.AddSensor("s", stereo, {t["position"]}, {.loss = {LossKind::kHuber, -1.0}});
             }),
-            "sensor 's': the robust loss has the scale -1; expected > 0");
+            "sensor 's': the scale of the robust loss is -1; expected a number > 0");
   EXPECT_EQ(Refusal([&](Problem& p, auto& t) {
               p.AddSensor("s", stereo, {t["position"]}, {.owned = {{0, OwnedState::Of({})}}});
             }),
             "sensor 's': role 0 in the option `owned` is not a model parameter state; expected a "
             "role with the flag ALIDADE_ROLE_OWNED and without a block");
   EXPECT_EQ(Refusal([](Problem&, auto& target) { static_cast<void>(target["depth"]); }),
-            "state 'target': no block 'depth'; expected position, velocity");
+            "state 'target': the state has no block 'depth'; expected position, velocity");
   EXPECT_EQ(Refusal([&](Problem& p, auto&) { p.AddSensor("s", stereo, {}); }),
-            "sensor 's': role 'depth' has no block; expected a vector(1)");
+            "sensor 's': role 'depth' has no block; expected a block that is a vector(1)");
   EXPECT_EQ(Refusal([&](Problem& p, auto& t) {
               p.AddSensor("s", stereo, {t["position"], t["velocity"]});
             }),
-            "sensor 's': 2 blocks for the roles; expected 1: depth");
+            "sensor 's': the number of blocks for the roles is 2; expected at most 1: depth");
   EXPECT_EQ(Refusal([&](Problem& p, auto&) {
               const auto wide = p.AddState("wide", Constant<2>(2), {{"value", {0.0, 0.0}, 1.0}});
               p.AddSensor("s", stereo, {wide["value"]});
             }),
-            "sensor 's': role 'depth' has block 'wide.value', a vector(2); expected a vector(1)");
+            "sensor 's': role 'depth' has the block 'wide.value', which is a vector(2); expected a "
+            "block that is a vector(1)");
   EXPECT_EQ(Refusal([](Problem& p, auto& t) {
               p.AddSensor("s", Scale2d::FromPixels(300.0, 1.0), {t["position"], t["position"]});
             }),
@@ -212,8 +213,8 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
         const auto wide = p.AddState("wide", Constant<3>(3), {{"value", {0.0, 0.0, 0.0}, 1.0}});
         p.AddSensor("b", Pseudorange(1.0), {wide["value"]}, {.stream = "camera"});
       }),
-      "sensor 'b': stream 'camera' has size 1 and 0 known numbers; expected size 1 and 3 known "
-      "numbers");
+      "sensor 'b': stream 'camera' is already used with measurements of size 1 and 0 known "
+      "numbers; expected size 1 and 3 known numbers");
   EXPECT_EQ(
       Refusal([](Problem& p, auto&) {
         p.AddState(
@@ -238,9 +239,8 @@ TEST(Problem, AFilterRefusesABlockThatCannotStart) {
   };
   EXPECT_EQ(refusal("position", "stereo"), "nothing");
   EXPECT_EQ(refusal("position", "stero"),
-            "Ekf: from_measurement: no sensor 'stero' in this estimator (block 'target.position'); "
-            "expected a "
-            "sensor of this estimator; did you mean 'stereo'?");
+            "Ekf: from_measurement: this estimator has no sensor 'stero' (block "
+            "'target.position'); expected a sensor of this estimator; did you mean 'stereo'?");
   EXPECT_EQ(refusal("velocity", "stereo"),
             "Ekf: from_measurement: sensor 'stereo' does not determine this block (block "
             "'target.velocity'); expected a sensor whose inverse measurement model determines this "
@@ -255,9 +255,8 @@ TEST(Problem, AFilterRefusesACycleOfFirstMeasurements) {
   problem.AddSensor("a_by_b", Scale2d::FromPixels(300.0, 1.0), {b["value"], a["value"]});
   problem.AddSensor("b_by_a", Scale2d::FromPixels(300.0, 1.0), {a["value"], b["value"]});
   EXPECT_EQ(RefusalOf([&] { Ekf filter(problem); }),
-            "Ekf: from_measurement: cyclic initialisation: a.value <- b.value <- a.value (block "
-            "'a.value'); "
-            "expected a mean for one block of the cycle");
+            "Ekf: from_measurement: the initialisation is cyclic: a.value <- b.value <- a.value "
+            "(block 'a.value'); expected a mean for one block of the cycle");
 }
 
 TEST(Problem, AFilterRefusesARoleThatNoMeasurementImplies) {

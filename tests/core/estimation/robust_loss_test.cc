@@ -139,9 +139,9 @@ struct Normal {
   }
 };
 
-// Both elements have the same weight. R is correlated and comes with the measurement. With `fuse:
-// per_*`, the d of the second measurement is computed after the first update. A gate uses S without
-// the loss.
+// Both elements have the same weight. R is correlated and is supplied with the measurement. With
+// per-sensor and per-measurement updates, the d of the second measurement is computed after the
+// first update. A gate uses S without the loss.
 TYPED_TEST(RobustFilter, WeighsAMeasurementOfTwoElementsAsAWhole) {
   Problem problem;
   const SharedMotion still = testing::ConstantMotion(2);
@@ -188,7 +188,7 @@ TEST(RobustLoss, HuberLeavesAnInlierAsItIs) {
   EXPECT_EQ(robust.covariance().Dense(), plain.covariance().Dense());
 }
 
-// x is constant, so every smoothed estimate uses all measurements: 1 / P = 1/4 + w + 1.
+// x is constant, so every smoothed estimate uses all measurements, with 1 / P = 1/4 + w + 1.
 TEST(RobustLoss, TheSmootherGoesBackWithROverW) {
   const Problem problem = Measured(kHuber);
   RtsSmoother rts(problem, {}, StreamsOf(problem));
@@ -206,8 +206,8 @@ TEST(RobustLoss, TheSmootherGoesBackWithROverW) {
   EXPECT_EQ(count, 2);
 }
 
-// Compares with central differences of step 1e-5. Their errors are 1e-10 f''', plus a rounding
-// error of 1e-11. No loss has a kink at these points.
+// Compares with central differences of step 1e-5. The differences have errors of 1e-10 f''', plus a
+// rounding error of 1e-11. None of the losses has a kink at these points.
 TEST(EveryLoss, HasTheWeightAndTheCurvatureOfItsRho) {
   constexpr double kStep = 1e-5, kTolerance = 1e-8;
   for (std::size_t kind = 0; kind < kLosses.size(); ++kind) {

@@ -74,7 +74,7 @@ void ExpectSame(const State& a, const State& b) {
   EXPECT_EQ(a.covariance().Dense(), b.covariance().Dense());
 }
 
-/// Compares a run with delayed frames with a run of the same frames in order.
+/// Runs the same frames with delays and in order, and compares the two runs.
 template <class Type, class Options>
 void ExpectTheBitsOfTheInOrderRun(const Options& options) {
   const Problem problem = DepthFilter();
@@ -159,7 +159,7 @@ TEST(Rollback, AFrameBeyondTheWindowIsRefusedAsStaleAndChangesNothing) {
   EXPECT_EQ(report.events[0].kind, EventKind::kStale);
   EXPECT_EQ(
       report.events[0].text,
-      "the frame at 1.250000 s is 0.750000 s older than the newest frame, more than the window "
+      "the frame at 1.250000 s is 0.750000 s older than the newest frame, which exceeds the window "
       "of 0.500000 s: the measurements of this frame are not used");
   ExpectSame(late.filter().state(), in_order.state());
   late.Process(FrameAt(1.75, {{0, 81.0}}));  // this frame is within the window
@@ -193,7 +193,7 @@ TEST(Rollback, AWindowThatIsNoneIsMisuse) {
   EXPECT_THROW(Rollback(ekf, std::nan("")), ContractViolation);
 }
 
-/// The state is the sum of the measured values. The value 7 causes an exception.
+/// Estimator whose state is the sum of the measured values. The value 7 causes an exception.
 class Sum : public Estimator {
  public:
   void Start(Timestamp) override {}

@@ -17,7 +17,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// A direction that performs a random walk: n' = n (+) w.
+/// Motion model of a direction that performs a random walk: n' = n (+) w.
 struct Wander : Motion<2, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"n", "", "", "x,y,z"}};
   double sigma;
@@ -61,10 +61,10 @@ Eigen::Matrix<double, 3, 2> BasisAt(const double* n) {
   return Eigen::Map<Eigen::Matrix<double, 3, 2, Eigen::RowMajor>>(basis);
 }
 
-/// Gauss-Newton over all directions with numeric derivatives.
+/// Batch solution that applies Gauss-Newton with numeric derivatives to all directions together.
 struct DirectionBatch {
   Prior prior;
-  double sigma;                         ///< noise of a step, and of a measurement
+  double sigma;                         ///< standard deviation of a step and of a measurement
   std::vector<Eigen::Vector3d> n = {};  ///< solution of the last iteration
   /// One measurement per frame; empty if the frame has none.
   std::vector<std::vector<double>> z = {};
@@ -110,8 +110,8 @@ struct DirectionBatch {
   }
 };
 
-/// Largest differences of smoother and batch: of estimates in standard deviations, and of P as a
-/// ratio.
+/// Largest differences between the smoother and the batch. The difference of estimates is divided
+/// by the standard deviation, and the difference of P by P.
 struct SeamDistance {
   double estimate = 0.0, covariance = 0.0;
 };
@@ -164,10 +164,10 @@ SeamDistance Follow(double sigma) {
 }
 
 // The smoother is linearised at the filter's estimates, and the batch at its own solution. Because
-// of the curvature of the sphere, they differ by a term of second order in the angles, in units of
-// sigma. If the angles are a quarter as large, this term is a sixteenth as large, but an error of
-// first order would be a quarter. The factor 8 is halfway on a logarithmic scale. An error at the
-// discontinuity would not become smaller.
+// of the curvature of the sphere, the two results differ by a term of second order in the angles,
+// in units of sigma. If the angles are divided by 4, this term is divided by 16, but an error of
+// first order would be divided only by 4. The factor 8 is halfway on a logarithmic scale. An error
+// at the discontinuity would not become smaller.
 TEST(RtsSmoother, FollowsADirectionAcrossTheSeamOfItsBasisAsTheBatchDoes) {
   const SeamDistance wide = Follow(2e-3), narrow = Follow(0.5e-3);
   EXPECT_GT(wide.estimate, 8.0 * narrow.estimate) << wide.estimate << ' ' << narrow.estimate;

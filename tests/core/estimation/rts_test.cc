@@ -16,8 +16,8 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// Least squares over the first state and all noise inputs, which also works if Q is singular: x_k
-/// = Phi_k x_0 + sum Gamma w, z_k = H x_k + n.
+/// Least squares over the first state and all noise inputs, which also works if Q is singular:
+/// x_k = Phi_k x_0 + sum Gamma w, z_k = H x_k + n.
 struct DenseBatch {
   std::vector<Eigen::MatrixXd> map;  ///< each x_k as a linear function of the unknowns
   Eigen::MatrixXd normal;
@@ -110,9 +110,9 @@ TEST(RtsSmoother, GapsInPartsAndTheGateAreThoseOfTheFilter) {
     EXPECT_EQ(state.covariance().Dense(), ekf.state().covariance().Dense());
   });
   ASSERT_EQ(sigma.size(), frames.size());
-  EXPECT_LT(sigma[0], 0.09);  // more accurate than the measurement alone
-  // The second smoother takes the same steps as frames without measurements: 4 for 0.35 s, and 6
-  // for 0.6 s.
+  EXPECT_LT(sigma[0], 0.09);  // this sigma is smaller than that of the measurement alone
+  // The second smoother processes the steps of the first smoother as frames without measurements: 4
+  // for 0.35 s, and 6 for 0.6 s.
   options.max_dt_s = std::numeric_limits<double>::infinity();
   RtsSmoother in_frames(problem, options, StreamsOf(problem));
   std::vector<double> of_frames;

@@ -372,7 +372,8 @@ struct Mixed : Sensor<Vec<1>, Vec<1>, Vec<3>> {
   }
 };
 
-/// Adds a block `t.x` of three elements that perform a random walk. Their priors are correlated.
+/// Adds a block `t.x` of three elements that perform a random walk. The priors of the elements are
+/// correlated.
 void AddTriple(Problem& problem) {
   const SharedMotion walk = testing::ConstantMotion(3, 0.2);
   const BlockId id = problem.layout.Declare("t.x", "t", walk->blocks()[0]);
@@ -381,7 +382,7 @@ void AddTriple(Problem& problem) {
   problem.priors.push_back({id, {1.0, 1.0, 1.0}, p, ""});
 }
 
-/// Returns a problem with `n` states. From n = 4 on, it has a block of three states. The remaining
+/// Returns a problem with `n` states. If n >= 4, three of the states form one block. The remaining
 /// states form as many pairs of position and velocity as possible. All motions have noise. The
 /// sensors relate the first scalar to the other states.
 Problem OfSize(int n) {
@@ -411,7 +412,8 @@ Problem OfSize(int n) {
 
 class SmallEkfOfSize : public ::testing::TestWithParam<int> {};
 
-// The frames have one measurement, two, or one of each sensor. The updates have 1 to 6 rows.
+// Each frame has one measurement, two measurements, or one measurement of every sensor. The updates
+// have 1 to 6 rows.
 TEST_P(SmallEkfOfSize, DoesWhatALargeOneDoes) {
   const Problem problem = OfSize(GetParam());
   ASSERT_EQ(problem.InitialState().covariance().size(), GetParam());

@@ -29,7 +29,7 @@ struct MeasuredDirection : Sensor<UnitVector, UnitVector> {
   }
 };
 
-/// A direction that does not change.
+/// Motion model of a direction that does not change.
 struct Fixture : Motion<0, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"n", "", "", "x,y,z"}};
   template <class T>
@@ -39,8 +39,8 @@ struct Fixture : Motion<0, UnitVector> {
   void SqrtQ(double, MatrixRef) const {}
 };
 
-/// Returns a problem with a direction at z = 0.05. The measurement moves the direction across z
-/// = 0, where the basis of the tangent plane is discontinuous.
+/// Returns a problem with a direction at z = 0.05. The measurement moves the direction across the
+/// plane z = 0. In this plane the basis of the tangent plane is discontinuous.
 Problem DirectionNearTheSeam() {
   Problem problem;
   MotionBinding binding{"d", MakeMotion(Fixture(), "still"), {}};
@@ -65,8 +65,7 @@ Eigen::Matrix3d InSpace(const State& state) {
 }
 
 // In the tangent plane at the prior, h is the identity: 1/P+ = 1/P + 1/R. The update then rotates P
-// with the direction, by the smallest rotation.
-// Fault 84 of tests/faults/README.md.
+// with the direction, by the smallest rotation. Tests fault 84 of tests/faults/README.md.
 TEST(SquareRootEkf, CarriesTheCovarianceOfADirectionAcrossTheSeamOfItsBasis) {
   const Problem problem = DirectionNearTheSeam();
   SquareRootEkf filter(problem, {}, StreamsOf(problem));

@@ -31,7 +31,7 @@ struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-/// Kalman filter of MovingPoint(0.7) with one direct measurement. It computes the inverse of S.
+/// Kalman filter of MovingPoint(0.7) with one direct measurement, computed with the inverse of S.
 struct DirectTextbook {
   Eigen::Vector2d x{1.0, -0.5};
   Eigen::Matrix2d p = Eigen::Vector2d(4.0, 9.0).asDiagonal();

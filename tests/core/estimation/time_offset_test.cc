@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Tests a sensor with a clock offset: worked numbers, Jacobians compared with numeric ones, and
-// data that are late.
+// late data.
 #include "alidade/estimation/time_offset.h"
 
 #include <gtest/gtest.h>
@@ -49,7 +49,8 @@ TEST(TimeOffset, SeesAPointWhereItIsThen) {
   EXPECT_EQ(NamesOf(sensor.model), (std::vector<std::string>{"x", "p.v", "time_offset"}));
   EXPECT_EQ(sensor.roles[1].block, problem.layout.Find("p.v"));
   EXPECT_EQ(sensor.roles[2].block, offset);
-  EXPECT_EQ(sensor.model->inverse().role, -1) << "x is no longer where z says";
+  EXPECT_EQ(sensor.model->inverse().role, -1)
+      << "z alone does not determine x if the clock has an offset";
   for (const double delta : {0.0, 0.25, -0.5}) {
     const Blocks roles{{3.0}, {-4.0}, {delta}};
     double z = kPoison, l = kPoison;
@@ -61,8 +62,8 @@ TEST(TimeOffset, SeesAPointWhereItIsThen) {
   }
 }
 
-// A camera that rotates and moves sees a landmark. This tests rotations, landmark roles and an
-// inverse measurement model.
+// Tests rotations, landmark roles and an inverse measurement model: a camera that rotates and moves
+// sees a landmark.
 TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
   const Camera camera(640, 480, 400, 400, 320, 240);
   for (const bool anchored : {false, true}) {
@@ -88,7 +89,7 @@ TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
     const std::vector<std::string> names = NamesOf(sensor.model);
     EXPECT_EQ(names[4], "time_offset");
     EXPECT_EQ(names.size(), anchored ? 8u : 6u);
-    EXPECT_EQ(sensor.model->inverse().role, inverse + 3) << "of the landmark";
+    EXPECT_EQ(sensor.model->inverse().role, inverse + 3) << "expected the role of the landmark";
     EXPECT_EQ(sensor.xyz != nullptr, anchored);
     if (anchored) {
       EXPECT_EQ(sensor.xyz->roles().size(), 6u);
@@ -116,13 +117,14 @@ TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
     } else {
       roles[5] = {0.4, 0.3, 3.0};
     }
-    // df/ddelta is itself a numeric derivative. Its error is 1e-12 of the values, divided by 1 ms.
+    // df/ddelta is itself a numeric derivative. The error of this derivative is 1e-12 of the
+    // values, divided by 1 ms.
     ExpectSame(SensorJacobian(sensor.model, roles), NumericSensorJacobian(sensor.model, roles),
                1e-7);
   }
 }
 
-/// Constant velocity. Throws for speeds above the speed of light.
+/// Constant-velocity motion model that throws for speeds above the speed of light.
 struct Refusing : ConstantVelocity<1, false> {
   using ConstantVelocity<1, false>::ConstantVelocity;
   template <class T>
@@ -162,9 +164,8 @@ TEST(TimeOffset, RefusesWhatItCannotDo) {
             std::string::npos);
 }
 
-// A point oscillates. One sensor is on time. The measurements of the other sensor are from t -
-// 0.02, so its timestamps are 20 ms late. The true motion is a sine, which no motion model
-// generates.
+// A point oscillates. One sensor is on time. The other sensor measures the point 20 ms before the
+// timestamp of the measurement. The true motion is a sine, which no motion model generates.
 TEST(TimeOffset, IsFoundInDataThatAreLate) {
   Problem problem = testing::MovingPoint(2.0);
   AddSensor(problem, "good", LinearSensor(1.0, 0.01), {"p.x"});

@@ -36,7 +36,7 @@ TEST(Ukf, PointsThatWouldLeaveTheDomainAreDrawnNearerAndThatIsSaid) {
   EXPECT_TRUE(HasEvent(ukf.Process(FrameAt(3.0, {{0, 80.0}})), EventKind::kGuarded));
 }
 
-/// The value 1 is constant. Any other value causes an exception.
+/// Motion model of a constant 1. Any other value causes an exception.
 struct Stubborn : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -82,9 +82,9 @@ Problem NearZero(double x) {
   return problem;
 }
 
-// The estimate is down to 1e-3 sigma from the edge of the domain. The sigma points are then 1e-3
-// sigma from the estimate. For a linear h the moments equal those of the EKF at any spread. At the
-// narrowest spread the rounding error is eps 5 / (2 c^2) = 6e-10.
+// In the last case the estimate is only 1e-3 sigma away from the edge of the domain. The sigma
+// points are then 1e-3 sigma away from the estimate. For a linear h the moments equal those of the
+// EKF at any spread. At the narrowest spread the rounding error is eps 5 / (2 c^2) = 6e-10.
 TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
   for (const double x : {0.05, 9e-4, 1e-4, 2e-5}) {
     const Problem problem = NearZero(x);
@@ -103,7 +103,7 @@ TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
   }
 }
 
-// So close to the estimate, sigma points would give only rounding errors.
+// If sigma points are this close to the estimate, their differences contain only rounding errors.
 TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
   for (const double x : {1e-7, 3e-10}) {
     const Problem problem = NearZero(x);
@@ -113,10 +113,9 @@ TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
     EXPECT_TRUE(report.measurements()[0].h.empty());
     ASSERT_EQ(report.events.size(), 1u);
     EXPECT_EQ(report.events[0].kind, EventKind::kGuarded);
-    EXPECT_EQ(
-        report.events[0].text,
-        "sensor 'near': sigma points are out of domain or have no mean, even with the smallest "
-        "spread; their spread is divided by 64");
+    EXPECT_EQ(report.events[0].text,
+              "sensor 'near': sigma points are outside the domain or have no mean, even with the "
+              "smallest spread; their spread is divided by 64");
     EXPECT_FALSE(ukf.diverged());
     EXPECT_EQ(ValueOf(ukf.state(), "p.x"), x);
     // The event is reported once.

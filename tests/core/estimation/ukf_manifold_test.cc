@@ -74,9 +74,9 @@ using GeometryAlphaSize = std::tuple<std::uint32_t, double, int>;
 class UkfOf : public ::testing::TestWithParam<GeometryAlphaSize> {};
 
 // The covariances are isotropic. Every step adds Q, and for the measured block 1/P+ = 1/P + 1/R.
-// The sigma points are c sigma from the estimate, c^2 <= 60. This changes moments by a fraction c^2
-// sigma^2 / 12 <= 2e-3. Each correction changes the estimates by this fraction of an innovation of
-// 0.04.
+// The sigma points are c sigma from the estimate, and c^2 <= 60. This distance changes the moments
+// by a fraction c^2 sigma^2 / 12 <= 2e-3. Each correction changes the estimates by this fraction of
+// an innovation of 0.04.
 TEST_P(UkfOf, FollowsBlocksForAThousandSteps) {
   const auto [number, alpha, n] = GetParam();
   const Problem problem = WanderersOf(number, n);
@@ -156,8 +156,8 @@ struct Dragged : Motion<2, Vec<2>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = l(1, 1) = 0.1; }
 };
 
-// N = 4, so c = 2: the sigma points of v are at 2 sigma. The step multiplies them by 1 - 0.3 dt 2
-// sigma.
+// N = 4, so c = 2: the sigma points of v are 2 sigma away from the estimate. The step multiplies
+// them by 1 - 0.3 dt 2 sigma.
 TEST(Ukf, NeedsNoDerivativeOfTheMotion) {
   Problem problem;
   const SharedMotion model = MakeMotion(Dragged(), "dragged");
@@ -167,7 +167,7 @@ TEST(Ukf, NeedsNoDerivativeOfTheMotion) {
   Ekf ekf(problem, {}, {});
   ekf.Start(0);
   ekf.Process(FrameAt(0.1, {}));
-  ASSERT_TRUE(ekf.failed()) << "the derivative is to be not a number";
+  ASSERT_TRUE(ekf.failed()) << "the EKF must fail, because the derivative is NaN";
   UkfOptions options;
   options.alpha = 1.0;
   Ukf ukf(problem, options, {});
@@ -181,7 +181,7 @@ TEST(Ukf, NeedsNoDerivativeOfTheMotion) {
   EXPECT_NEAR(ukf.state().value(v)[0], 0.0, 1e-15);
 }
 
-/// In steps of more than 1 s, Qw is NaN if `in_noise`; otherwise v' is NaN.
+/// In steps of more than 1 s, Qw is NaN if `in_noise` is true. Otherwise v' is NaN.
 struct Breaking : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"v"}};
   bool in_noise = false;
@@ -208,7 +208,7 @@ TEST(Ukf, AStepThatIsNotFiniteEndsItInTheWordsOfTheEkf) {
       ASSERT_EQ(report.events.size(), 1u);
       EXPECT_EQ(report.events[0].kind, EventKind::kNotFinite);
       EXPECT_EQ(report.events[0].text,
-                "motion model of 'p' predicts a state that is not finite; last good state at "
+                "the motion model of 'p' predicts a state that is not finite; last good state at "
                 "0.000000 s: p.v = 1");
     }
   }
@@ -237,7 +237,7 @@ void ExpectReportsOfTheEkf() {
     EXPECT_EQ(a.h, b.h);
     EXPECT_EQ(a.innovation, b.innovation);
     EXPECT_EQ(a.s, b.s);
-    EXPECT_NEAR(a.nis, b.nis, 1e-14 * a.nis);  // S is factored in another order
+    EXPECT_NEAR(a.nis, b.nis, 1e-14 * a.nis);  // S is factored in a different order
     EXPECT_EQ(std::vector<double>(ukf.state().value(0), ukf.state().value(0) + G::kAmbient),
               prior.mean);
   }

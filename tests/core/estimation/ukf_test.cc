@@ -15,7 +15,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-// At first P is singular, because v is known exactly. Q has rank 1, and the noise of the
+// In the first step P is singular, because v is known exactly. Q has rank 1, and the noise of the
 // measurements is not small.
 TEST(Ukf, EqualsTheKalmanFilterOnALinearProblemWithSingularCovariances) {
   Problem problem = MovingPoint(0.7);
@@ -70,8 +70,8 @@ struct Square : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-// If x ~ N(m, s^2), then E[x^2] = m^2 + s^2, Var[x^2] = 4 m^2 s^2 + 2 s^4 and Cov[x, x^2] = 2 m
-// s^2. The filter is exact for c^2 = 3 and beta = 0.
+// If x ~ N(m, s^2), then E[x^2] = m^2 + s^2, Var[x^2] = 4 m^2 s^2 + 2 s^4 and
+// Cov[x, x^2] = 2 m s^2. The filter is exact for c^2 = 3 and beta = 0.
 TEST(Ukf, GetsTheMomentsOfASquareExactly) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.5, 0.8}});
@@ -91,7 +91,8 @@ TEST(Ukf, GetsTheMomentsOfASquareExactly) {
   EXPECT_NEAR(CovarianceOf(ukf.state(), "p.x", "p.x"), v - k * k * s, 1e-13);
 }
 
-/// An orientation that rotates by a random w ~ N(0, sigma^2 I) in each step: q' = q Exp(w).
+/// Motion model of an orientation that rotates by a random w ~ N(0, sigma^2 I) in each step: q' = q
+/// Exp(w).
 struct TurningOrientation : Motion<3, UnitQuaternion> {
   static constexpr std::array kBlocks{Quantity{"q", "", "", "w,x,y,z"}};
   double sigma;
@@ -136,9 +137,9 @@ Problem Orientation() {
   return problem;
 }
 
-// The covariances are isotropic, and the orientation is measured directly. So 1/P+ = 1/(P + Q) +
-// 1/R at every orientation. To second order in sigma, the estimate is on the great circle to the
-// measurement.
+// The covariances are isotropic, and the orientation is measured directly, so 1/P+ = 1/(P + Q) +
+// 1/R at every orientation. To second order in sigma, the estimate lies on the great circle between
+// the prediction and the measurement.
 TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
   const Problem problem = Orientation();
   UkfOptions options;
@@ -166,8 +167,8 @@ TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
     ASSERT_NEAR(Eigen::Map<const Eigen::Vector4d>(q).norm(), 1.0, 1e-12);
     double between[3];
     UnitQuaternion::Minus(q, ekf.state().value(0), between);
-    // Sigma points at sqrt(6) sigma change the moments by a fraction sigma^2 / 12, which is at most
-    // 1e-3 here.
+    // Sigma points at a distance of sqrt(6) sigma change the moments by a fraction sigma^2 / 12,
+    // which is at most 1e-3 here.
     ASSERT_LT(Eigen::Map<const Eigen::Vector3d>(between).norm(), 1e-3) << k;
     ASSERT_LT((ukf.state().covariance().Dense() - p * Eigen::Matrix3d::Identity()).norm(), 0.01 * p)
         << k;
@@ -176,7 +177,7 @@ TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
 }
 
 // In the joint update the disparity sensor needs sigma points closer to the estimate. The gate and
-// the report of the other sensor use its sigma points with the full spread.
+// the report of the other sensor use sigma points with the full spread.
 TEST(Ukf, ReportsOfAJointUpdateWhatTheGateSaw) {
   Problem problem = DepthFilter();
   problem.priors[0].covariance(0) = 1.0;
@@ -213,7 +214,7 @@ struct First : Sensor<Vec<1>, Vec<2>> {
   }
 };
 
-// Fault 82 of tests/faults/README.md.
+// Tests fault 82 of tests/faults/README.md.
 TEST(Ukf, ACovarianceWithoutASquareRootIsRepairedAndThatIsSaid) {
   Problem problem;
   MotionBinding binding{"p", testing::ConstantMotion(2), {}};

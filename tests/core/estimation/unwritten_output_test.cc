@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A plugin must write every element of its outputs. The output memory is initialised with NaN, so
-// an element that is never written is NaN at every measurement. `alidade check` reports all
-// unwritten elements.
+// Tests plugins that do not write every element of their outputs. The output memory is initialised
+// with NaN, so an element that is never written is NaN at every measurement. `alidade check`
+// reports all unwritten elements.
 #include <gtest/gtest.h>
 
 #include "alidade/plugin/plugin_models.h"
@@ -13,8 +13,9 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// The output that is left incomplete. In an L, the elements above the diagonal are not written. In
-/// h, the last element is not written. In other outputs, the off-diagonal elements are not written.
+/// Selects the output that is left incomplete. In an L, the elements above the diagonal are not
+/// written. In h, the last element is not written. In other outputs, the off-diagonal elements are
+/// not written.
 enum class Left { kNothing, kPrediction, kSensorL, kSensorH, kMotionL, kF, kG };
 
 void WriteDiagonal(double value, bool zeros_too, double* j, int stride) {
@@ -32,7 +33,8 @@ void WriteLower(double value, bool zeros_too, double* l, int stride) {
 }
 bool Leaves(const void* self, Left what) { return *static_cast<const Left*>(self) == what; }
 
-/// Models of two elements, z = x + n and x' = x + w. They use the C header directly.
+/// Sensor z = x + n and motion model x' = x + w, each of two elements, written directly against the
+/// C header.
 struct HandWritten {
   explicit HandWritten(Left left_out) : left(left_out) {
     space.struct_size = sizeof(space);
@@ -95,8 +97,8 @@ struct HandWritten {
   AlidadeMotion motion{};
 };
 
-/// Returns a problem with the state `a.x`, measured by the sensor `direct`. If `aside`, it also has
-/// a constant block.
+/// Returns a problem with the state `a.x`, measured by the sensor `direct`. If `aside` is true, the
+/// problem also has a constant block.
 Problem Direct(HandWritten& hand, bool aside) {
   Problem problem;
   const auto model = std::make_shared<PluginMotion>(hand.Make(ALIDADE_KIND_MOTION));

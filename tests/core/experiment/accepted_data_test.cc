@@ -14,7 +14,8 @@ constexpr int kFrames = 80;
 /// `outliers` is false, these measurements are missing.
 class WithOutliers : public SwingingTarget {
  public:
-  /// If `late`, frames 3 i and 3 i + 1 are swapped, so every third frame is out of sequence.
+  /// If `late` is true, frames 3 i and 3 i + 1 are swapped, so every third frame is out of
+  /// sequence.
   WithOutliers(bool outliers, bool late) : SwingingTarget(0) {
     SwingingTarget target(kFrames);
     SourceFrame frame;
@@ -109,8 +110,8 @@ class GivenFrames : public Source {
   std::size_t next_ = 0;
 };
 
-/// Builds a chain of three ekf. The first has a gate. Each of the others uses the measurements that
-/// the previous ekf accepted.
+/// Builds a chain of three ekf. The first ekf has a gate. The second and the third use the
+/// measurements that the previous ekf accepted.
 Experiment MakeChain(const Problem& problem, std::vector<StreamInfo> streams,
                      std::vector<Frame> frames) {
   Experiment experiment;
@@ -127,8 +128,8 @@ Experiment MakeChain(const Problem& problem, std::vector<StreamInfo> streams,
   return experiment;
 }
 
-// No sensor uses the odometry stream, so all its values are passed on. This also holds for a frame
-// whose fix is gated.
+// No sensor uses the odometry stream, so all its values are passed on, even those of a frame whose
+// fix is gated.
 TEST(AcceptedBy, PassesOnTheControlInputs) {
   Problem problem;
   AddMotion(problem, "car", MakeMotion(Driven(0.2), "driven"), {{"position", 1.0, 0.5}});
@@ -195,7 +196,8 @@ struct Once : Ekf {
   bool gone_ = false;
 };
 
-// The frame at which the filter ends is still used, because the filter accepted its measurements.
+// The measurements of the frame at which the filter ends are still used, because the filter
+// accepted them.
 TEST(AcceptedBy, AFilterThatEndedAcceptsNothingMore) {
   Experiment experiment = MakeFiltered(false);
   EstimatorSpec& filter = experiment.estimators[0];
@@ -218,7 +220,7 @@ TEST(AcceptedBy, ASensorOfWhichTheFilterTookNothingIsNamed) {
   const auto event = std::ranges::find(run.estimators[1].events, EventKind::kUnused, &Event::kind);
   ASSERT_NE(event, run.estimators[1].events.end());
   EXPECT_EQ(event->text,
-            "sensor 'disparity': stream 'disparity' had no measurement that gated accepted");
+            "sensor 'disparity': stream 'disparity' had no measurement that 'gated' accepted");
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ SourceFrame SwingingFrame(int k) {
 
 const std::vector<StreamInfo> kTruths = {{"depth"}, {"depth_rate"}, {"inverse_distance"}};
 
-// Compares the bound with the information form. Its derivatives at the truth are written out by
+// Compares the bound with the information form, whose derivatives at the truth are written out by
 // hand.
 TEST(CramerRaoBound, IsTheInverseOfTheInformationAtTruth) {
   const Problem problem = testing::DepthFilter();
@@ -77,7 +77,7 @@ TEST(CramerRaoBound, TakesTheMotionAtTruth) {
   Problem problem;
   testing::AddMotion(problem, "p", MakeMotion(DoubleWell(), "double_well"), {{"x", 5.0, 0.5}});
   testing::AddSensor(problem, "z", testing::LinearSensor(1.0, 0.4), {"p.x"});
-  problem.initial_time_s = -0.1;  // one step before the first frame; the state is nearly the same
+  problem.initial_time_s = -0.1;  // one step before the first frame
   CramerRaoBound bound(problem, testing::StreamsOf(problem), {{"x"}});
   const double dt_s = 0.1, q = dt_s * dt_s;
   double p = 0.25, before = 0.0;
@@ -106,8 +106,8 @@ TEST(CramerRaoBound, OfALinearProblemIsTheCovarianceOfTheKalmanFilter) {
   }
 }
 
-// A robust loss, a Schmidt (consider) gain and a Jacobian at the implied state make a filter worse.
-// They do not change the bound.
+// A robust loss, a Schmidt (consider) gain and a Jacobian at the implied state make a filter worse,
+// but they do not change the bound.
 TEST(CramerRaoBound, IsThatOfTheBestFilter) {
   Problem worse = testing::DepthFilter();
   worse.sensors[0].loss = {LossKind::kCauchy, 0.1};
@@ -129,7 +129,8 @@ TEST(CramerRaoBound, EndsWhereTruthIsNotKnown) {
   SourceFrame without = SwingingFrame(1);
   without.truth[1].clear();
   EXPECT_FALSE(bound.Add(without));
-  EXPECT_FALSE(bound.Add(SwingingFrame(2))) << "for good";
+  EXPECT_FALSE(bound.Add(SwingingFrame(2)))
+      << "the bound must remain undefined in all later frames";
 }
 
 TEST(CramerRaoBound, TellsWhyThereIsNone) {
@@ -168,8 +169,8 @@ Eigen::Vector2d Pixel(const Eigen::Vector3d& r, const Eigen::Vector3d& p) {
   return {h.x() / h.z(), h.y() / h.z()};
 }
 
-/// Returns true if frame k sees landmark `id`. The landmark is first seen in frame `id`, and then
-/// in all frames but every fourth.
+/// Returns true if frame k sees landmark `id`. The landmark is first seen in frame `id`. Afterwards
+/// it is seen in all frames except every fourth.
 bool Sees(int k, int id) { return k >= id && (k == id || (k + id) % 4 != 0); }
 
 SourceFrame MappingFrame(int k, double noise) {
@@ -269,7 +270,8 @@ TEST(CramerRaoBound, OfAMapIsThatOfPathAndPointsTogether) {
   }
 }
 
-/// A camera that rotates at 0.3 rad/s about its y axis. Its position performs a random walk.
+/// A camera that rotates at 0.3 rad/s about its y axis. The position of the camera performs a
+/// random walk.
 struct TurningWalk : Motion<6, Vec<3>, UnitQuaternion> {
   static constexpr std::array kBlocks{testing::kPosition, Quantity{"orientation"}};
   template <class T>
@@ -388,7 +390,7 @@ TEST(CramerRaoBound, OfATurningCamera) {
 }
 
 // All three coordinates of a landmark are measured, so no prior is needed. Two landmarks are known
-// beforehand, one of them exactly.
+// in advance, one of them exactly.
 TEST(CramerRaoBound, OfLandmarksMeasuredWholeOrKnown) {
   LandmarkOptions options;
   options.known = {{0, *PlaceOf(0), 0.02}, {1, *PlaceOf(1), 0.0}};
@@ -451,9 +453,8 @@ TEST(CramerRaoBound, TellsWhyLandmarksCannotStartAtTruth) {
   EXPECT_EQ(CramerRaoBound::WhyUnavailable(problem, truths),
             "'tracks' has a custom landmark representation");
   problem.sensors[0].model = MakeSensor(XyzByPrior(), "xyz");
-  EXPECT_EQ(
-      CramerRaoBound::WhyUnavailable(problem, truths),
-      "'tracks' initialises xyz landmarks with a prior, and the Jacobians depend on its mean");
+  EXPECT_EQ(CramerRaoBound::WhyUnavailable(problem, truths),
+            "'tracks' initialises xyz landmarks with a prior, whose mean changes the Jacobians");
 }
 
 TEST(CramerRaoBound, EndsAtALandmarkWithoutTruth) {

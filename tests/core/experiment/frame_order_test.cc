@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Faults 36 and 37 of tests/faults/README.md: late frames and equal timestamps, frame by frame.
+// Tests faults 36 and 37 of tests/faults/README.md: late frames and equal timestamps, frame by
+// frame.
 #include <algorithm>
 #include <stdexcept>
 
@@ -23,8 +24,8 @@ SourceFrame GivenAt(double t_s, const std::vector<std::pair<int, double>>& value
   return {FrameAt(t_s, values)};
 }
 
-/// A source with the given frames. Frame k is in line k + 2 of rows.csv. If `then_fails`, the
-/// source throws after the last frame.
+/// A source with the given frames. Frame k is in line k + 2 of rows.csv. If `then_fails` is true,
+/// the source throws after the last frame.
 class Given : public SwingingTarget {
  public:
   explicit Given(std::vector<SourceFrame> frames, bool then_fails = false)
@@ -55,8 +56,8 @@ Experiment MakeGiven(std::vector<SourceFrame> frames, OutOfSequence order,
 }
 
 TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
-  // A frame that is 0.1 s older than the newest is within the window. A frame that is a nanosecond
-  // older is not.
+  // A frame that is 0.1 s older than the newest frame is within the window. A frame that is another
+  // nanosecond older is outside the window.
   SourceFrame beyond = GivenAt(0.2, {{0, 80.0}, {1, 1.0}});
   beyond.timestamp -= 1;
   Experiment experiment = MakeGiven(
@@ -98,7 +99,7 @@ TEST_P(FrameOrder, AStreamTwiceAtOneTimestampIsAnErrorThatNamesBothPlaces) {
   EXPECT_EQ(result.code, ExitCode::kBadData);
   EXPECT_EQ(
       result.reason,
-      "rows.csv:6: two measurements of stream 'inverse_scale' at t = 0.050000 s; expected one "
+      "rows.csv:6: stream 'inverse_scale' has two measurements at t = 0.050000 s; expected one "
       "measurement per timestamp; the first is in rows.csv:3");
   EXPECT_EQ(result.frames, 3);  // the frames before the error are kept
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
@@ -145,7 +146,7 @@ TEST_P(FrameOrder, AStreamTwiceInMergedFramesNamesTheFirstOfItsOwn) {
       GetParam());
   experiment.out_of_sequence.ranks = {2, 1, 0};
   EXPECT_EQ(alidade::Run(experiment, {}).reason,
-            "rows.csv:4: two measurements of stream 'aside' at t = 0.000000 s; expected one "
+            "rows.csv:4: stream 'aside' has two measurements at t = 0.000000 s; expected one "
             "measurement per timestamp; the first is in rows.csv:3");
 }
 
@@ -170,7 +171,7 @@ TEST_P(FrameOrder, TwoTruthsAtOneTimestampAreAnError) {
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.code, ExitCode::kBadData);
   EXPECT_EQ(result.reason,
-            "rows.csv:4: two values of truth 'depth' at t = 0.000000 s; expected one value per "
+            "rows.csv:4: truth 'depth' has two values at t = 0.000000 s; expected one value per "
             "timestamp");
 }
 
@@ -199,8 +200,8 @@ TEST_P(FrameOrder, BadDataKeepsTheFramesHeldBack) {
 }
 
 TEST_P(FrameOrder, DivergenceUnderFailEndsTheRunAtTheFrameOfTheInOrderRun) {
-  // Both sensors are undefined for a negative depth, so from the second frame on they reject it as
-  // out of domain.
+  // Both sensors are undefined for a negative depth. They therefore reject this depth as out of
+  // domain from the second frame on.
   const std::vector<SourceFrame> frames = {GivenAt(0.0, {}), GivenAt(0.05, {{0, 80.0}}),
                                            GivenAt(0.1, {{0, 80.0}}), GivenAt(0.15, {{0, 80.0}})};
   std::vector<Timestamp> ends;
@@ -245,7 +246,8 @@ struct Mortal : Ekf {
   bool failed_ = false;
 };
 
-// The depth is negative, so the estimator diverges at the first frame. It fails at the third frame.
+// The depth is negative, so the estimator diverges at the first frame. The estimator fails at the
+// third frame.
 TEST_P(FrameOrder, AStopLeavesTheEstimatorsAndTheLogAtTheLastFrameTaken) {
   std::vector<SourceFrame> frames;
   for (int k = 0; k < 8; ++k) frames.push_back(GivenAt(0.05 * k, {{0, 80.0 - k}, {1, 1.0}}));
@@ -348,7 +350,7 @@ TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
   EXPECT_EQ(result.frames, 2);
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 2);
   for (const EstimatorSpec& one :
-       // Checks both estimators: the first had already processed the third frame.
+       // Checks both estimators, because the first one had already processed the third frame.
        experiment.estimators) {
     EXPECT_EQ(one.estimator->timestamp(), TimestampFromSeconds(0.02));
   }

@@ -24,7 +24,7 @@ TEST(ImpliedState, OfASensorThatInitialisesAlone) {
   ASSERT_TRUE(depth);
   EXPECT_FALSE(depth->uses_true_roles());
   EXPECT_EQ(problem.layout[depth->block()].name, "target.depth");
-  const double d = 65.0, none = -1.0;  // in px; f B = 26 px m
+  const double d = 65.0, none = -1.0;  // disparities in px; f B = 26 px m
   EXPECT_DOUBLE_EQ(depth->From({}, &d).value(), 0.4);
   EXPECT_FALSE(depth->From({}, &none));
 }
@@ -38,7 +38,8 @@ TEST(ImpliedState, OfAnotherWithItsRestAtTruth) {
   const double z = 1.25;  // z = lambda Z
   EXPECT_NEAR(depth->From({{0.3}, {2.5}}, &z).value(), 0.5, 1e-12);
   EXPECT_FALSE(depth->From({{0.3}, {}}, &z)) << "lambda is not known at this time";
-  EXPECT_FALSE(ImpliedState::Of(problem, scale, {{"depth", 1}})) << "nor at any";
+  EXPECT_FALSE(ImpliedState::Of(problem, scale, {{"depth", 1}}))
+      << "the truth does not contain lambda at any time";
 }
 
 TEST(ImpliedStateMetrics, AreTheErrorOfSingleMeasurements) {

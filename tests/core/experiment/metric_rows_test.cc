@@ -120,9 +120,9 @@ TEST(ComparisonTable, FoldsWhatIsWiderThanALine) {
   EXPECT_GT(widest, 60);
 }
 
-// The table must contain the two rows of health, all five rows of the first turn and three rows of
-// the second. In all there are 9 rows of blocks, 6 of segments (without lag), 4 means, 3 counts and
-// 2 rows of health. Of these 24 rows, 14 are omitted.
+// The table must contain the two rows of health, all five rows of the first round and three rows of
+// the second round. In all there are 9 rows of blocks, 6 of segments (without lag), 4 means, 3
+// counts and 2 rows of health. Of these 24 rows, 14 are omitted.
 TEST(MainRows, AreDealtOutInTheOrderOfTheConfig) {
   RunResult result;
   std::map<std::string, double> metrics;
@@ -149,8 +149,8 @@ TEST(MainRows, AreDealtOutInTheOrderOfTheConfig) {
       << internal::MainTable(result, subjects);
 }
 
-// The map is not one of the subjects. Its rows belong to the first turn, and their unit is that of
-// the position.
+// The map is not one of the subjects. The rows of the map belong to the first round, and their unit
+// is that of the position.
 TEST(MainRows, HaveTheErrorOfTheMapBeforeThatAfterAlignment) {
   std::map<std::string, double> metrics = {{"map.rmse", 0.012}, {"map.sim3.rmse", 0.007}};
   for (const char* block : {"cam.position", "cam.velocity", "cam.heading"}) {

@@ -42,7 +42,7 @@ class FakeSource : public Source {
   std::vector<StreamInfo> streams_, truths_;
 };
 
-/// Metrics of one estimator. The test sets the states of the estimator.
+/// Computes the metrics of one estimator. The test sets the states of the estimator.
 class MetricsOf {
  public:
   MetricsOf(const StateLayout& layout, const std::vector<StreamInfo>& truths, int segments = 0)
@@ -98,7 +98,7 @@ MetricsOf OneScalar(int segments = 0) {
 TEST(Metrics, TakesErrorsByHand) {
   MetricsOf one = OneScalar();
   one.Add({{3.0}});   // error -3 m, sigma 2 m: within 1.96 sigma
-  one.Add({{-4.0}});  // error 4 m: more than 1.96 sigma, 3.92 m
+  one.Add({{-4.0}});  // error 4 m: more than 1.96 sigma, which is 3.92 m
   one.Add({{}});      // the truth is unknown
   const auto metrics = one.Finish();
   EXPECT_DOUBLE_EQ(metrics.at("rmse:a.x"), std::sqrt(12.5));
@@ -110,7 +110,8 @@ TEST(Metrics, TakesErrorsByHand) {
   EXPECT_EQ(one.metrics().units().at("a.x"), "m");
 }
 
-// The elements of an orientation and of a direction have no unit. Their errors are in rad.
+// The elements of an orientation and of a direction have no unit. The errors of both blocks are in
+// rad.
 TEST(Metrics, ErrorsOfRotationsAreInRad) {
   StateLayout layout;
   layout.Declare("a.q", "a", SpaceOf("q", "", Geometry::UnitQuaternion()));
@@ -191,7 +192,7 @@ TEST(Metrics, MatchesTruthsByName) {
   // Ambiguous: x may belong to both blocks.
   EXPECT_EQ(Matched({"a.x", "b.x"}, {{"x", 1}}), Names{});
   EXPECT_EQ(Matched({"a.x", "b.x"}, {{"x", 1}, {"b.x", 1}}), Names{"b.x"});
-  EXPECT_EQ(Matched({"a.x"}, {{"x", 2}}), Names{});  // the truth has another size than the block
+  EXPECT_EQ(Matched({"a.x"}, {{"x", 2}}), Names{});  // truth and block differ in size
   EXPECT_EQ(Matched({"a.x"}, {{"a", 1}, {"ax", 1}}), Names{});
 }
 
@@ -218,8 +219,8 @@ TEST(Metrics, LeavesOutBlocksWithoutValueOrCovariance) {
 }
 
 TEST(Metrics, NeesOfErrorsDrawnFromPIsOne) {
-  // The elements are correlated and differ widely in size. Their variances are 4 and 1e-6, and
-  // their correlation is 0.6.
+  // The elements are correlated and differ widely in size. The variances are 4 and 1e-6, and the
+  // correlation is 0.6.
   Eigen::Matrix2d p;
   p << 4.0, 0.6 * 2.0 * 1e-3, 0.6 * 2.0 * 1e-3, 1e-6;
   const Eigen::Matrix2d root = p.llt().matrixL();
@@ -235,8 +236,8 @@ TEST(Metrics, NeesOfErrorsDrawnFromPIsOne) {
     one.Add({{-error[0]}, {-error[1]}});
   }
   const auto metrics = one.Finish();
-  // chi2(2) / 2 has variance 1, and a share s has variance s (1 - s). The tolerance is five
-  // standard deviations.
+  // chi2(2) / 2 has the variance 1, and a proportion s has the variance s (1 - s), each divided by
+  // n. The tolerance is five standard deviations.
   EXPECT_NEAR(metrics.at("nees.mean:a"), 1.0, 5.0 / std::sqrt(n));
   EXPECT_NEAR(metrics.at("nees.within95:a"), 0.95, 5.0 * std::sqrt(0.95 * 0.05 / n));
   EXPECT_NEAR(metrics.at("coverage95:a.x"), 0.95, 5.0 * std::sqrt(0.95 * 0.05 / n));
@@ -247,7 +248,7 @@ TEST(Metrics, BoundsOfTheNeesAreThoseOfIndependentErrors) {
   Random random(1);
   for (int i = 0; i < 2000; ++i) one.Add({{2.0 * random.Normal()}});
   const auto metrics = one.Finish();
-  // The errors are white, so tau is 1 apart from a sampling error.
+  // The errors are white, so tau is 1 except for a sampling error.
   const Interval bounds = ConsistencyBounds(1.0, 2000.0);
   EXPECT_EQ(metrics.at("nees.dof:a"), 1.0);
   EXPECT_NEAR(metrics.at("nees.low:a"), bounds.low, 0.3 * (1.0 - bounds.low));
@@ -319,7 +320,7 @@ TEST(Metrics, LagOfALongRunIsThatOfItsBeginning) {
     one.state().values()[0] = x(i - 1.5);
     one.Add({{x(i)}});
   }
-  one.Skip(50'000'000);  // neither the gap nor the later samples have an effect
+  one.Skip(50'000'000);  // neither the gap nor any later sample has an effect
   for (int i = 0; i < 1000; ++i) one.Add({{0.0}});
   EXPECT_NEAR(one.Finish().at("lag_ms:a.x"), 150.0, 1.0);
 }
@@ -355,7 +356,8 @@ TEST(Metrics, TellsOnceOfErrorsBeyondTenSigma) {
             "a.x: the error, 21 m, exceeded 10 sigma for 20 timestamps in a row; sigma is 2 m");
 }
 
-// The truth has a sigma of 3 m and the filter one of 2 m, so the error has the variance 13 m^2.
+// The truth has a sigma of 3 m and the filter has a sigma of 2 m, so the error has the variance 13
+// m^2.
 TEST(Metrics, TheUncertaintyOfTheTruthBelongsToTheError) {
   MetricsOf one(Scalars({"a.x"}), {{"x", 1, 3.0}});
   const double zero = 0.0;

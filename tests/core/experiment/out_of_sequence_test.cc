@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Faults 36 and 37 of tests/faults/README.md: frames that are not in the order of their timestamps.
+// Tests faults 36 and 37 of tests/faults/README.md: frames that are not in the order of their
+// timestamps.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -15,7 +16,8 @@ namespace {
 
 constexpr double kWindow_s = 0.2;  // equals six frame intervals of the simulator
 
-/// Config with all types of filter, and with a smoother, which waits for all frames.
+/// Config with all types of filter, and with a smoother, which processes the frames only after the
+/// last frame has arrived.
 constexpr const char* kFilters = R"(alidade: 1
 state:
   target: {model: constant_velocity, blocks: {position: depth, velocity: depth_rate},
@@ -42,8 +44,9 @@ evaluate:
   segments: {seeing: {with: stereo}, blind: {without: stereo}}
 )";
 
-/// Blocks are initialised from their first measurement. The gate is so narrow that sensors need
-/// rejection recovery. So the results depend on more of the filter than the state.
+/// Config whose blocks are initialised from their first measurement. The gate is so narrow that
+/// sensors need rejection recovery. The results therefore depend on more than the state of the
+/// filter.
 constexpr const char* kEventful = R"(alidade: 1
 state:
   target: {model: constant_velocity, blocks: {position: depth, velocity: depth_rate},
@@ -64,8 +67,8 @@ estimators:
 )";
 
 /// A source whose frames are delayed by a random time of at most `most_s`. The first frame is
-/// delayed by exactly `most_s`. If `split`, each measurement and the truth arrive in frames of
-/// their own.
+/// delayed by exactly `most_s`. If `split` is true, each measurement and the truth arrive in
+/// separate frames.
 class Delayed : public Source {
  public:
   Delayed(std::unique_ptr<Source> source, double most_s, bool split) : source_(std::move(source)) {
@@ -101,7 +104,7 @@ class Delayed : public Source {
   std::size_t next_ = 0;
 };
 
-/// Runs the experiment of the config with delayed frames. Records the run in `folder`.
+/// Runs the experiment of the config with delayed frames, and records the run in `folder`.
 RunResult RecordDelayed(const std::string& text, const fs::path& folder, OutOfSequence order,
                         double most_s, bool split = false) {
   const Config config = Config::FromText(text, "order.yaml");
@@ -212,11 +215,11 @@ TEST(OutOfSequencePolicy, IsReadStrictly) {
   EXPECT_EQ(ranks["inverse_scale"], 1);
   EXPECT_EQ(ranks["disparity_all"], 2);  // no sensor uses this stream
   EXPECT_EQ(Refused("out_of_sequence: {policy: rollback}"),
-            "order.yaml:25:27 out_of_sequence.policy: 'rollback' without 'window_s'; expected "
-            "'window_s', the largest lag of an out-of-sequence frame");
+            "order.yaml:25:27 out_of_sequence.policy: 'policy: rollback' needs the key 'window_s'; "
+            "expected 'window_s', the largest lag of an out-of-sequence frame in seconds");
   EXPECT_EQ(Refused("out_of_sequence: {policy: reject, window_s: 1}"),
-            "order.yaml:25:45 out_of_sequence.window_s: has no effect: 'policy: reject' does not "
-            "buffer frames; expected 'policy: buffer' or 'rollback'");
+            "order.yaml:25:45 out_of_sequence.window_s: this key has no effect, because 'policy: "
+            "reject' does not buffer frames; expected 'policy: buffer' or 'policy: rollback'");
   EXPECT_NE(Refused("out_of_sequence: {policy: buffered}").find("did you mean 'buffer'?"),
             std::string::npos);
   EXPECT_NE(Refused("out_of_sequence: {policy: buffer, window_s: -1}")
@@ -249,7 +252,7 @@ TEST(Sort, LetsATableHaveItsRowsInAnyOrder) {
   }
   EXPECT_EQ(run("0.2,82,\n0.1,81,1\n0.2,83,1\n", buffer).reason,
             (folder / "rows.csv").string() +
-                ":4: two measurements of stream 'disparity' at t = 0.200000 s; expected one "
+                ":4: stream 'disparity' has two measurements at t = 0.200000 s; expected one "
                 "measurement per timestamp; the first is in " +
                 (folder / "rows.csv").string() + ":2");
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests metrics relative to a reference estimator, which replaces the truth.
+// Tests metrics relative to a reference estimator. The reference replaces the truth.
 #include <malloc.h>
 
 #include <cmath>
@@ -12,8 +12,8 @@
 namespace alidade::testing {
 namespace {
 
-/// A smoother that estimates a depth of 0.3 m at all frames except the first. If `fails`, it fails
-/// instead.
+/// A smoother that estimates a depth of 0.3 m at all frames except the first. If `fails` is true,
+/// the smoother fails instead.
 struct Known : Estimator {
   Known(const Problem& problem, bool fails) : state_(problem.InitialState()), failed_(fails) {}
   void Start(Timestamp) override {}
@@ -67,8 +67,8 @@ Experiment MakeCompared(bool fails = false) {
   return experiment;
 }
 
-/// Returns the depth that an ekf estimates at each frame. If `alone`, this is the second estimator,
-/// otherwise the first.
+/// Returns the depth that an ekf estimates at each frame. If `alone` is true, this ekf is the
+/// second estimator, otherwise the first.
 std::vector<double> Depths(bool alone) {
   Experiment experiment = MakeExperiment();
   Estimator& ekf = *experiment.estimators[alone ? 1 : 0].estimator;
@@ -108,8 +108,8 @@ TEST(Reference, MayBeAnyEstimatorOfTheRun) {
               std::abs(0.3 - alone.back()), 1e-12);
 }
 
-// The covariance of an estimator describes its error relative to truth. It does not describe the
-// distance from another estimator. NIS uses neither of the two.
+// The covariance of an estimator describes its error relative to truth, not its distance from
+// another estimator. NIS depends neither on the truth nor on another estimator.
 TEST(Reference, WithholdsWhatTheCovarianceDoesNotTell) {
   Experiment experiment = MakeCompared();
   const RunResult run = alidade::Run(experiment, {});
@@ -124,16 +124,17 @@ TEST(Reference, WithholdsWhatTheCovarianceDoesNotTell) {
   EXPECT_EQ(run.estimators[0].counts.at("accepted:inverse_scale"), 60);
 }
 
-// Fault 85 of tests/faults/README.md.
+// Tests fault 85 of tests/faults/README.md.
 TEST(Reference, ThatFailedIsNone) {
   Experiment experiment = MakeCompared(true);
   const RunResult run = alidade::Run(experiment, {});
   EXPECT_EQ(run.status, RunStatus::kFailed);
   EXPECT_EQ(run.withheld,
-            "no reference: estimator 'known' failed, the comparison with it is withheld");
+            "no reference is available: estimator 'known' failed, so the comparison with this "
+            "estimator is withheld");
   EXPECT_EQ(run.estimators[0].metrics.count("rmse:target.depth"), 0u);
   EXPECT_EQ(run.estimators[0].metrics.count("nis.mean:disparity"), 1u);
-  EXPECT_NE(ComparisonTable(run).find("\nno reference: estimator 'known' failed"),
+  EXPECT_NE(ComparisonTable(run).find("\nno reference is available: estimator 'known' failed"),
             std::string::npos);
 }
 
@@ -160,7 +161,7 @@ class Counting : public Blind {
 // The P of a state with 302 elements takes 0.7 MB. The covariances of 100 frames of two estimators
 // would take 146 MB, and their values 0.5 MB.
 TEST(Reference, KeepsNoCovariances) {
-  if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
+  if (kSanitized) GTEST_SKIP() << "the sanitizer does not return freed memory to the heap";
   std::size_t grown = 0;
   Experiment experiment;
   experiment.source = std::make_unique<Counting>(100, grown);
@@ -203,7 +204,8 @@ TEST(Reference, WithoutEstimatesIsNone) {
   const RunResult run = alidade::Run(experiment, {});
   EXPECT_EQ(run.code, ExitCode::kBadData);
   EXPECT_EQ(run.withheld,
-            "no reference: estimator 'known' has no estimates, the comparison with it is withheld");
+            "no reference is available: estimator 'known' has no estimates, so the comparison with "
+            "this estimator is withheld");
   // An online filter has estimates up to the error.
   Experiment online = MakeCompared();
   online.source = std::make_unique<Torn>(60);
@@ -220,7 +222,8 @@ TEST(Reference, IsNamedBelowTheTableInRunJsonAndInTheReport) {
   const RunResult run = RunInto(recorder, experiment);
   recorder.Finish(run);
   const std::string words =
-      "errors are differences from estimator 'known', which is not the truth: no coverage, no NEES";
+      "errors are differences from estimator 'known', not from truth; coverage and NEES are not "
+      "computed";
   EXPECT_TRUE(ComparisonTable(run).ends_with('\n' + words + '\n')) << ComparisonTable(run);
   EXPECT_NE(Read(folder / "out/run.json").find("\"reference\": \"known\""), std::string::npos);
   EXPECT_NE(Read(folder / "out/report.html").find("differences from estimator"), std::string::npos);

@@ -17,7 +17,7 @@ namespace {
 
 using testing::MakeExperiment;
 
-/// The value becomes infinite in the first step.
+/// Motion model whose value becomes infinite in the first step.
 struct Exploding : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -178,7 +178,7 @@ TEST(Run, AStopAfterAFailureIsStillAFailure) {
   EXPECT_NE(result.reason.find("estimator 'exploding'"), std::string::npos) << result.reason;
 }
 
-/// A source that waits for frame 7, as for a pipe, and is interrupted by a signal.
+/// A source that is interrupted by a signal while it waits for frame 7.
 struct SignalledSource : Source {
   explicit SignalledSource(std::unique_ptr<Source> of) : frames(std::move(of)) {}
   const std::vector<StreamInfo>& streams() const override { return frames->streams(); }
@@ -205,7 +205,7 @@ TEST(Run, ASignalToItsSourceAfterAFailureIsStillAFailure) {
   }
 }
 
-/// A smoother that is stopped by a signal.
+/// A smoother that is interrupted by a signal.
 struct Interrupted : Hindsight {
   using Hindsight::Hindsight;
   void Smooth(const Emit&) override { throw Error(ExitCode::kStopped, "a signal"); }
@@ -229,7 +229,8 @@ TEST(Run, AStopOfASmootherAfterAFailureIsStillAFailure) {
   EXPECT_EQ(std::ranges::count(events, EventKind::kStopped, &Event::kind), 1);
 }
 
-/// A random walk with steps N(0, 0.1^2), one each second. It is measured with noise of sigma 1.
+/// A source that measures a random walk. Each second the walk makes one step N(0, 0.1^2). The noise
+/// of the measurements has sigma 1.
 class Walking : public testing::SwingingTarget {
  public:
   explicit Walking(std::uint64_t seed) : SwingingTarget(0), random_(seed) {
@@ -248,8 +249,8 @@ class Walking : public testing::SwingingTarget {
   int k_ = 0;
 };
 
-/// Runs a filter on Walking and returns its result. The filter assumes `factor` times the true
-/// standard deviations.
+/// Runs a filter on Walking and returns the result of the filter. The filter assumes `factor` times
+/// the true standard deviations.
 EstimatorResult WalkWith(double factor, std::uint64_t seed = 1) {
   Experiment experiment;
   experiment.source = std::make_unique<Walking>(seed);
@@ -276,14 +277,13 @@ TEST(Run, AnOverconfidentFilterIsAnEvent) {
   EXPECT_GT(result.metrics.at("nees.mean:p"), 30.0);
   ASSERT_EQ(TextsOf(result, EventKind::kNeesBounds).size(), 1u);
   const std::string nees = TextsOf(result, EventKind::kNeesBounds)[0];
-  EXPECT_TRUE(nees.starts_with("NEES mean ")) << nees;
-  EXPECT_NE(nees.find(" of p is outside its 95 % bounds ["), std::string::npos) << nees;
+  EXPECT_TRUE(nees.starts_with("the mean NEES of p is ")) << nees;
+  EXPECT_NE(nees.find(", outside the 95 % bounds ["), std::string::npos) << nees;
   EXPECT_TRUE(nees.ends_with("]: the filter is overconfident")) << nees;
   ASSERT_EQ(TextsOf(result, EventKind::kNisBounds).size(), 1u);
   const std::string nis = TextsOf(result, EventKind::kNisBounds)[0];
-  EXPECT_TRUE(nis.starts_with("NIS mean ")) << nis;
-  EXPECT_NE(nis.find(" of sensor disparity is outside its 95 % bounds ["), std::string::npos)
-      << nis;
+  EXPECT_TRUE(nis.starts_with("the mean NIS of sensor disparity is ")) << nis;
+  EXPECT_NE(nis.find(", outside the 95 % bounds ["), std::string::npos) << nis;
 }
 
 TEST(Run, AnUnderconfidentFilterIsAnEvent) {
@@ -292,8 +292,8 @@ TEST(Run, AnUnderconfidentFilterIsAnEvent) {
   EXPECT_TRUE(texts[0].ends_with("]: the filter is underconfident")) << texts[0];
 }
 
-// 10 of 200 runs, 5 %, are expected outside the bounds, with a standard deviation of 3. The bounds
-// of the NEES are wider.
+// Of the 200 runs, 10 (5 %) are expected outside the bounds, with a standard deviation of 3. The
+// bounds of the NEES are wider.
 TEST(Run, AConsistentFilterIsRarelyOutsideItsBounds) {
   std::size_t nees = 0, nis = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
@@ -321,7 +321,7 @@ struct Compass : Sensor<Angle, Angle> {
   }
 };
 
-/// A heading that performs a random walk.
+/// Motion model of a heading that performs a random walk.
 struct Turn : Motion<1, Angle> {
   static constexpr std::array kBlocks{Quantity{"heading", "rad"}};
   template <class T>
@@ -331,8 +331,8 @@ struct Turn : Motion<1, Angle> {
   void SqrtQ(double dt_s, MatrixRef l) const { l(0, 0) = 0.2 * std::sqrt(dt_s); }
 };
 
-/// A heading that rotates at a constant rate and is measured ten times a second. Measurements are
-/// in rad times `unit`, wrapped to one turn or not.
+/// A source that measures a heading ten times a second. The heading rotates at a constant rate. The
+/// measurements are in rad times `unit`. If `wrapped` is true, they are wrapped to one turn.
 class Turning : public testing::SwingingTarget {
  public:
   Turning(double rate_rad_s, double unit, bool wrapped)
@@ -377,13 +377,13 @@ TEST(Run, DegreesForRadiansAreAnEvent) {
       ASSERT_EQ(texts.size(), 1u) << gate << ' ' << rate;
       EXPECT_EQ(
           texts[0],
-          "sensor 'disparity': the median of |z - h| is more than 5 sigma, and |z - h| > pi / "
-          "4 or |z| > 2 pi; is stream 'disparity' in rad?");
+          "sensor 'disparity': most measurements z and their predictions h differ by more than "
+          "5 sigma, with |z - h| > pi / 4 or |z| > 2 pi; is stream 'disparity' in rad?");
     }
   }
 }
 
-// The measured heading is wrapped to one turn, or it is counted over several turns.
+// The measured heading is either wrapped to one turn or counted over several turns.
 TEST(Run, RadiansAreNoEvent) {
   for (const double gate : {1.0, 0.9999}) {
     for (const double rate : {0.0, 0.3, 0.9, -0.9}) {
@@ -433,8 +433,8 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
   ekf.problem.motions.clear();
   ekf.estimator = std::make_unique<Ekf>(ekf.problem, options, experiment.source->streams());
   EXPECT_EQ(unused(alidade::Run(experiment, {}).estimators[0]),
-            (Texts{"sensor 'disparity' used none of 30 measurements: 30 gated",
-                   "sensor 'inverse_scale' used none of 60 measurements: 60 gated",
+            (Texts{"sensor 'disparity': the estimator used none of 30 measurements: 30 gated",
+                   "sensor 'inverse_scale': the estimator used none of 60 measurements: 60 gated",
                    "sensor 'elsewhere': stream 'elsewhere' had no measurement"}));
 }
 
@@ -452,7 +452,7 @@ class Failing : public testing::SwingingTarget {
   int count_ = 0;
 };
 
-/// A source with a speed and a fix each second.
+/// A source that provides a speed and a fix once a second.
 class EachSecond : public testing::SwingingTarget {
  public:
   explicit EachSecond(int frames) : SwingingTarget(0), left_(frames) {}
@@ -468,7 +468,8 @@ class EachSecond : public testing::SwingingTarget {
   double t_s_ = 0.0;
 };
 
-// Each input arrives too late. The run reports this with one event and a count.
+// From the second step on, every input is older than its timeout. The run reports this fault with
+// one event and a count.
 TEST(Run, AnInputThatIsMissingAgainAndAgainIsOneEventAndACount) {
   Experiment experiment;
   experiment.source = std::make_unique<EachSecond>(100);
@@ -498,7 +499,8 @@ TEST(Run, BadDataKeepsWhatWasDone) {
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 5);
 }
 
-/// A source that throws a logic_error after five frames, which is a defect of the program.
+/// A source that throws a logic_error after five frames. Such an exception indicates a defect of
+/// the program.
 class Breaking : public testing::SwingingTarget {
  public:
   Breaking() : SwingingTarget(60) {}
@@ -515,7 +517,7 @@ class Breaking : public testing::SwingingTarget {
 struct Mapless : Hindsight {
   using Hindsight::Hindsight;
   std::vector<LandmarkEstimate> landmarks() const override {
-    throw std::out_of_range("a landmark that is none");
+    throw std::out_of_range("a missing landmark");
   }
 };
 
@@ -527,7 +529,7 @@ TEST(Run, AFailureAtTheEndKeepsTheResults) {
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.status, RunStatus::kFailed);
   EXPECT_EQ(result.code, ExitCode::kInternal);
-  EXPECT_NE(result.reason.find("a landmark that is none"), std::string::npos) << result.reason;
+  EXPECT_NE(result.reason.find("a missing landmark"), std::string::npos) << result.reason;
   ASSERT_EQ(result.estimators.size(), 2u);
   EXPECT_FALSE(result.estimators[1].metrics.empty());
 }
@@ -594,15 +596,17 @@ TEST(Run, AFrameThatBreaksTheContractOfItsSourceEndsTheRun) {
            {[](SourceFrame& f) {
               f.measurements[0].covariance = {1, 0, 0, 1};
             },
-            "a covariance of 4 numbers of 'inverse_scale', not 1"},
+            "a covariance of 'inverse_scale' with 4 numbers, not 1"},
            {[](SourceFrame& f) { f.measurements[0].stream = -1; },
-            "a measurement of stream -1 of 2"},
-           {[](SourceFrame& f) { f.measurements[0].stream = 2; }, "a measurement of stream 2 of 2"},
+            "a measurement with stream index -1, although the number of streams is 2"},
+           {[](SourceFrame& f) { f.measurements[0].stream = 2; },
+            "a measurement with stream index 2, although the number of streams is 2"},
            {[](SourceFrame& f) {
               f.truth[0] = {1, 2};
             },
             "2 values of 'depth', not 1"},
-           {[](SourceFrame& f) { f.truth.resize(2); }, "2 truths of 1"}}) {
+           {[](SourceFrame& f) { f.truth.resize(2); },
+            "2 truths, although the number of truths is 1"}}) {
     Experiment experiment = MakeExperiment();
     const SharedSensor stereo = experiment.estimators[0].problem.sensors[1].model;
     experiment.segments.push_back({"near", 1, true, stereo});

@@ -67,8 +67,8 @@ TEST(Lag, FindsTheShiftOfARamp) {
     EXPECT_NEAR(Lag(Sampled(100, shift, straight), Sampled(100, 0.0, straight), 1.0), shift, 1e-9);
     EXPECT_NEAR(Lag(Sampled(100, shift, bent), Sampled(100, 0.0, bent), 1.0), shift, 0.02);
   }
-  // Noise of sigma 0.3 is added to a slope of 0.8 per sample. Over 100 samples its mean shifts the
-  // lag by 0.3 / sqrt(100) / 0.8 samples.
+  // Noise of sigma 0.3 is added to a slope of 0.8 per sample. Over 100 samples, the mean of the
+  // noise shifts the lag by 0.3 / sqrt(100) / 0.8 samples.
   Random random(1);
   const auto noisy = [&](double i) { return straight(i) + 0.3 * random.Normal(); };
   EXPECT_NEAR(Lag(Sampled(100, 2.5, noisy), Sampled(100, 0.0, straight), 1.0), 2.5, 0.15);
@@ -105,7 +105,7 @@ TEST(Lag, IsUnknownWithoutAnythingToMatch) {
   EXPECT_TRUE(std::isnan(Lag(few, few, 1.0)));
 }
 
-// The series is 3, 3, 1.5, and then 1. Its centred RMS is:
+// The series is 3, 3, 1.5, and then 1. The centred RMS of this series is:
 // value 4  sqrt((9 + 9 + 2.25 + 4) / 7) = 1.86
 // value 5  sqrt((18 + 2.25 + 6) / 9) = 1.71
 // value 6  sqrt((9 + 2.25 + 7) / 9) = 1.42

@@ -40,7 +40,7 @@ TEST(JsonText, WritesNumbersThatReadBack) {
     const std::string text = JsonText(value);
     EXPECT_EQ(ParseJson(text, "").get<double>(), value) << text;
   }
-  EXPECT_EQ(JsonText(1.0), "1.0\n");  // a double keeps its decimal point
+  EXPECT_EQ(JsonText(1.0), "1.0\n");  // a double always has a decimal point
   EXPECT_EQ(JsonText(std::uint64_t{18446744073709551615u}), "18446744073709551615\n");
 }
 

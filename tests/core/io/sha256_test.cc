@@ -8,7 +8,8 @@
 namespace alidade {
 namespace {
 
-// Examples of NIST for FIPS 180-4: a message of one block, one of two blocks, and an empty message.
+// The expected values are NIST's examples for FIPS 180-4: a message of one block, a message of two
+// blocks, and an empty message.
 TEST(Sha256, AgreesWithTheStandard) {
   EXPECT_EQ(internal::Sha256("abc"),
             "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Sizes, offsets and values of plugin ABI 1.0. A failure here means that every plugin built before
- * breaks. A later minor version may only append lines to this file, for reserved members that it
- * uses and for structs of plugins that it extends. */
+/* Sizes, offsets and values of plugin ABI 1.0. A failure here means that the host can no longer use
+ * existing plugins. A later minor version may only append lines to this file: for reserved members
+ * that it uses, and for structs of plugins that it extends. */
 #include "alidade/model/plugin_abi.h"
 
 #ifdef __cplusplus

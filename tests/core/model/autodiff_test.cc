@@ -138,7 +138,7 @@ TEST(AutodiffMotion, TheJacobianByTheControlInputIsThatOfDifferences) {
       EXPECT_NEAR(b[static_cast<std::size_t>(4 * i + j)], (d_up[i] - d_down[i]) / (2.0 * h), 1e-9);
     }
   }
-  EXPECT_EQ(b[3], kPoison) << "the stride is kept";
+  EXPECT_EQ(b[3], kPoison) << "the memory between two rows must not be written";
 }
 
 /// Motion model x' = x + w. The analytic Jacobian writes its output and then throws.

@@ -23,8 +23,8 @@ Camera Made(CameraModel model, const std::array<double, 4>& k = {},
 Camera Pinhole() { return Made(CameraModel::kPinhole); }
 Camera Radtan() { return Made(CameraModel::kRadtan, {-0.28, 0.07, 0.015, 0.0}, {0.0012, -0.0007}); }
 Camera Equidistant() { return Made(CameraModel::kEquidistant, {-0.012, 0.034, -0.021, 0.005}); }
-// The lens of MonoSLAM has f = 2.1735 mm, pixels of 0.0112 mm, k1 = 0.06333 mm^-2 and k2
-// = 0.0139 mm^-4.
+// The lens of MonoSLAM has f = 2.1735 mm, pixels of 0.0112 mm, k1 = 0.06333 mm^-2 and
+// k2 = 0.0139 mm^-4.
 Camera Photogrammetric() {
   constexpr double kFocal_mm = 2.1735, kPixel_mm = 0.0112, kF2 = kFocal_mm * kFocal_mm;
   return Camera(320, 240, kFocal_mm / kPixel_mm, kFocal_mm / kPixel_mm, 1.7945 / kPixel_mm,
@@ -55,13 +55,13 @@ void ExpectPixels(const Camera& camera, const std::array<Pixel, 5>& expected) {
 }
 
 TEST(Camera, ProjectsAsOpenCvDoes) {
-  // Expected pixels from cv::projectPoints of OpenCV 4.6 with (k1, k2, p1, p2, k3).
+  // The expected pixels were computed by cv::projectPoints of OpenCV 4.6 with (k1, k2, p1, p2, k3).
   ExpectPixels(Radtan(), {{{472.2689879125, 139.08386068},
                            {101.668874202051, 383.859553225312},
                            {320.5, 239.25},
                            {597.528566563672, 444.315605924274},
                            {320.55249994834, 239.146000097136}}});
-  // Expected pixels from cv::fisheye::projectPoints.
+  // The expected pixels were computed by cv::fisheye::projectPoints.
   ExpectPixels(Equidistant(), {{{471.513622615548, 139.533068241162},
                                 {104.188698091775, 382.084129514002},
                                 {320.5, 239.25},
@@ -70,7 +70,7 @@ TEST(Camera, ProjectsAsOpenCvDoes) {
 }
 
 TEST(Camera, ProjectsAsMonoSlamDoes) {
-  // Expected pixels from r_d (1 + k1 r_d^2 + k2 r_d^4) = r_u in mm, solved by 200 bisections.
+  // The expected pixels solve r_d (1 + k1 r_d^2 + k2 r_d^4) = r_u in mm, after 200 bisections.
   ExpectPixels(Photogrammetric(), {{{216.180981148085, 91.5608935203241},
                                     {80.2554343010394, 182.177924751688},
                                     {160.223214285714, 128.866071428571},
@@ -103,15 +103,15 @@ TEST(Camera, DerivativesOfProjectAgreeWithDifferences) {
       Jet3 h[3], z[2];
       for (int i = 0; i < 3; ++i) h[i] = Jet3(point[static_cast<std::size_t>(i)], i);
       ASSERT_TRUE(camera.Project(h, z));
-      EXPECT_NEAR(z[0].a, Projected(camera, point)[0], 1e-12);  // the operations have another order
+      EXPECT_NEAR(z[0].a, Projected(camera, point)[0], 1e-12);  // the order of operations differs
       EXPECT_NEAR(z[1].a, Projected(camera, point)[1], 1e-12);
       for (int k = 0; k < 3; ++k) {
         Point more = point, less = point;
         more[static_cast<std::size_t>(k)] += kStep;
         less[static_cast<std::size_t>(k)] -= kStep;
         const Pixel a = Projected(camera, more), b = Projected(camera, less);
-        // The error of the differences is h^2 times third derivatives of order 1e4 px. Their
-        // rounding error is 1e-13 / h.
+        // The error of a difference is h^2 times third derivatives of order 1e4 px, plus a rounding
+        // error of 1e-13 / h.
         EXPECT_NEAR(z[0].v[k], (a[0] - b[0]) / (2 * kStep), 1e-5);
         EXPECT_NEAR(z[1].v[k], (a[1] - b[1]) / (2 * kStep), 1e-5);
       }
@@ -150,8 +150,8 @@ TEST(Camera, IsDefinedInFrontOfIt) {
   EXPECT_NEAR(z[0], 320.5 + 525 * std::acos(0.0), 1e-12);
 }
 
-// k1 = -0.3 and the other coefficients are zero. So r (1 - 0.3 r^2) has its maximum at r^2
-// = 1 / 0.9.
+// k1 = -0.3 and the other coefficients are zero, so r (1 - 0.3 r^2) has its maximum at
+// r^2 = 1 / 0.9.
 TEST(Camera, IsDefinedWhereTheDistortionGrows) {
   const Camera camera = Made(CameraModel::kRadtan, {-0.3, 0, 0, 0});
   const double turn = 1.0 / std::sqrt(0.9);
@@ -163,7 +163,7 @@ TEST(Camera, IsDefinedWhereTheDistortionGrows) {
   EXPECT_EQ(z, (Pixel{7, 7}));
   const Point within{turn * 0.99, 0, 1};
   EXPECT_TRUE(camera.Project(within.data(), z.data()));
-  const Pixel beyond{320.5 + 525 * turn, 239.25};  // no ray has this pixel as its image
+  const Pixel beyond{320.5 + 525 * turn, 239.25};  // no ray is projected to this pixel
   Point h{7, 7, 7};
   EXPECT_FALSE(camera.Unproject(beyond.data(), h.data()));
 }

@@ -8,9 +8,9 @@
 
 namespace alidade::testing {
 
-/// y = x (+) d, computed with 40 digits from the formulas of plugin_abi.h. These values fix the
-/// formulas, which are compiled into every plugin. A host with other formulas would misinterpret
-/// the tangents of a plugin.
+/// Values of y = x (+) d, computed with 40 digits from the formulas of plugin_abi.h. These values
+/// fix the formulas, which are compiled into every plugin. A host with other formulas would
+/// misinterpret the tangents of a plugin.
 struct PlusOfGeometry {
   std::uint32_t geometry;
   std::array<double, 4> x;

@@ -13,8 +13,9 @@ namespace {
 
 using Jet2 = Jet<double, 2>;
 
-/// Compares f(x, y) with central differences of step h = 1e-5. Their errors are h^2 f'''/6 and a
-/// rounding error of 1e-16/h. Both are below 1e-8 for functions and derivatives of order 1 to 100.
+/// Compares f(x, y) with central differences of step h = 1e-5. The differences have an error of h^2
+/// f'''/6 and a rounding error of 1e-16/h. Both errors are below 1e-8 for functions and derivatives
+/// of order 1 to 100.
 template <class F>
 void ExpectDerivatives(const F& f, double x, double y) {
   constexpr double kStep = 1e-5, kTolerance = 1e-8;

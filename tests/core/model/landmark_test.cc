@@ -17,7 +17,7 @@ using testing::Vec3;
 
 constexpr double kPi = 3.14159265358979323846;
 
-// The camera is at kPosition with the orientation kTurn. The point is 4 m away from it.
+// The camera is at kPosition with the orientation kTurn. The point is 4 m away from the camera.
 const Vec3 kPosition{0.4, -1.1, 0.3};
 const std::array<double, 4> kTurn{0.8, 0.2, -0.4, 0.4};
 const Vec3 kPoint{1.4, 0.9, 3.6};
@@ -124,7 +124,7 @@ TEST(Landmark, ConversionToXyzHasTrueJacobians) {
   });
 }
 
-// Faults 40 and 83 of tests/faults/README.md.
+// Tests faults 40 and 83 of tests/faults/README.md.
 TEST(Landmark, IsNotConvertedAtInfinityOrBehindIt) {
   for (const double rho : {0.0, -0.1}) {
     const Blocks blocks{{0, 0, 0, 0.1, 0.2, rho}};
@@ -135,8 +135,9 @@ TEST(Landmark, IsNotConvertedAtInfinityOrBehindIt) {
 }
 
 TEST(Landmark, LinearityIndexIsThatOfCivera) {
-  // The anchor is at the origin, the point is 4 m ahead, and the camera is 3 m to the side:
-  // d1 = 5 m, cos alpha = 0.8, sigma_d = 0.02 / 0.25^2 = 0.32 m; L_d = 4 0.32 / 5 0.8 = 0.2048
+  // The anchor is at the origin, the point is 4 m ahead, and the camera is 3 m to the side. So d1 =
+  // 5 m, cos alpha = 0.8, sigma_d = 0.02 / 0.25^2 = 0.32 m, and
+  // L_d = 4 * 0.32 / 5 * 0.8 = 0.2048.
   const double y[6] = {0, 0, 0, 0, 0, 0.25};
   const double beside[3] = {3, 0, 0};
   EXPECT_NEAR(LinearityIndex(InverseDepth::ToRay(y), 0.02, beside), 0.2048, 1e-15);

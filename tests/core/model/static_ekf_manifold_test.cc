@@ -11,7 +11,8 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// A rotation and a direction perform a random walk. Each also rotates about an axis of its own.
+/// Motion model of a rotation and a direction. Both perform a random walk, and each of them also
+/// rotates about its own axis.
 struct Wander : Motion<5, UnitQuaternion, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"q", "", "", "w,x,y,z"},
                                       Quantity{"u", "", "", "x,y,z"}};
@@ -124,7 +125,7 @@ TEST(StaticEkf, CarriesCovariancesAndLengthsOnManifoldsAsTheEngineDoes) {
   EXPECT_TRUE(above && below);
 }
 
-/// An angle that increases steadily. The model does not wrap it.
+/// Motion model of an angle that increases steadily. The model does not wrap the angle.
 struct Spin : Motion<1, Angle> {
   static constexpr std::array kBlocks{Quantity{"a", "rad"}};
   template <class T>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests how the descriptions that a plugin supplies are checked.
+// Tests how the host checks the descriptions that a plugin supplies.
 #include "alidade/plugin/model_instance.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 namespace alidade {
 namespace {
 
-/// A sensor written directly against the C header. It is valid unless a test changes it.
+/// A sensor written directly against the C header. The sensor is valid unless a test changes it.
 struct HandWritten {
   HandWritten() {
     role.struct_size = output.struct_size = sizeof(AlidadeSpace);
@@ -73,7 +73,7 @@ TEST(ModelInstance, AcceptsAHandWrittenSensorAndDestroysItOnce) {
     const PluginSensor sensor(std::make_shared<const ModelInstance>(hand.instance, "m", "p.so"));
     EXPECT_EQ(hand.destroyed, 0);
     double z = 0.0;
-    EXPECT_EQ(sensor.Predict(nullptr, &z), Status::kError) << "77 is no code of the ABI";
+    EXPECT_EQ(sensor.Predict(nullptr, &z), Status::kError) << "77 is not a status code of the ABI";
     EXPECT_EQ(sensor.SqrtNoise(nullptr, &z, &z), Status::kError);
   }
   EXPECT_EQ(hand.destroyed, 1);
@@ -343,7 +343,7 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
     test.spoil(hand);
     try {
       const ModelInstance instance(hand.instance, "bad_model", "/p/bad.so");
-      ADD_FAILURE() << "accepted: " << test.words;
+      ADD_FAILURE() << "the model was accepted; expected an error with: " << test.words;
     } catch (const Error& e) {
       const std::string text = e.what();
       EXPECT_EQ(e.code(), ExitCode::kPlugin);
@@ -351,7 +351,7 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
       EXPECT_NE(text.find("/p/bad.so"), std::string::npos) << text;
       EXPECT_NE(text.find("bad_model"), std::string::npos) << text;
     }
-    EXPECT_EQ(hand.destroyed, 1) << "what is refused is destroyed: " << test.words;
+    EXPECT_EQ(hand.destroyed, 1) << "a refused model must be destroyed: " << test.words;
   }
 }
 

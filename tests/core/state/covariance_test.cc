@@ -15,7 +15,7 @@ namespace {
 using internal::AddOuterProduct;
 using internal::Joseph;
 
-constexpr double kRounding = 1e-12;  // for sums of about 10 products of numbers of order 10
+constexpr double kRounding = 1e-12;  // sums of 10 products of order 100
 
 TEST(Covariance, BlocksAreThoseOfTheSymmetricMatrix) {
   Random random(1);

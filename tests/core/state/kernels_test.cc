@@ -20,8 +20,8 @@ using Eigen::VectorXd;
 
 constexpr double kKernelRounding = 1e-11;
 
-/// An update of n states, together with its dense matrices. `rows` contains the number of rows of
-/// each measurement.
+/// An update of n states and the dense matrices of this update. `rows` contains the number of rows
+/// of each measurement.
 struct KernelProblem {
   KernelProblem(int n, const std::vector<int>& rows, Random& random)
       : size(n), stride(PaddedSize(n)), capacity(2) {

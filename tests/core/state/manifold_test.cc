@@ -137,7 +137,8 @@ TEST_P(GeometryLaws, TransportIsOrthogonalAndTheIdentityAtOnePoint) {
         double jtj = 0.0;
         for (int k = 0; k < n; ++k) jtj += j[k * n + r] * j[k * n + c];
         EXPECT_NEAR(jtj, r == c, kTransport);
-        EXPECT_NEAR(back[r * n + c], j[c * n + r], kTransport) << "the way back is the inverse";
+        EXPECT_NEAR(back[r * n + c], j[c * n + r], kTransport)
+            << "the transport back must be the inverse";
         EXPECT_NEAR(same[r * n + c], r == c, 1e-15);
       }
     }
@@ -192,7 +193,7 @@ TEST(Product, IsItsPartsOneAfterTheOther) {
   EXPECT_EQ(off, x);
 }
 
-// Fault 84 of tests/faults/README.md.
+// Tests fault 84 of tests/faults/README.md.
 TEST(Angle, WrapsAtPlusAndMinusPi) {
   const Geometry angle = Geometry::Angle();
   const auto plus = [&](double x, double d) {
@@ -206,7 +207,7 @@ TEST(Angle, WrapsAtPlusAndMinusPi) {
     return d;
   };
   EXPECT_EQ(plus(kPi, 0.0), kPi);
-  EXPECT_EQ(plus(-kPi, 0.0), kPi) << "(-pi, pi]: -pi is written pi";
+  EXPECT_EQ(plus(-kPi, 0.0), kPi) << "angles lie in (-pi, pi], so -pi becomes pi";
   EXPECT_NEAR(plus(kPi, 1e-3), -kPi + 1e-3, 1e-15);
   EXPECT_NEAR(plus(-kPi, -1e-3), kPi - 1e-3, 1e-15);
   EXPECT_NEAR(plus(3.0, 20.0 * kPi), 3.0, 1e-13);
@@ -293,8 +294,8 @@ TEST(UnitVector, TransportCarriesTheVelocityOfAGeodesicAlongIt) {
 }
 
 TEST(UnitVector, TransportKeepsOrientation) {
-  // An orthogonal J could still be a reflection. det J = 1 must hold everywhere, also across the
-  // discontinuity of the basis.
+  // An orthogonal J could still be a reflection. det J = 1 must hold everywhere, including across
+  // the discontinuity of the basis.
   const Geometry geometry = Geometry::UnitVector();
   const double from[3] = {std::sqrt(1 - 1e-6), 0, 1e-3}, to[3] = {std::sqrt(1 - 1e-6), 0, -1e-3};
   double j[4];
@@ -347,7 +348,7 @@ TEST(Geometry, NormaliseGivesTheNearestPoint) {
   EXPECT_DOUBLE_EQ(q[3], 0.8);
   double zero[3] = {0, 0, 0};
   Geometry::UnitVector().Normalise(zero);
-  EXPECT_EQ(zero[2], 1.0) << "no direction: the neutral one";
+  EXPECT_EQ(zero[2], 1.0) << "a zero vector becomes the neutral direction";
   double angle = 7.0;
   Geometry::Angle().Normalise(&angle);
   EXPECT_NEAR(angle, 7.0 - 2.0 * kPi, 1e-15);
@@ -386,7 +387,7 @@ TEST(GeometryTable, NamesAsManyElementsAsThereAre) {
   EXPECT_EQ(FindGeometry(99), nullptr);
 }
 
-// Compares with derivatives by dual numbers. Only rounding errors are allowed.
+// Compares with derivatives that are computed with dual numbers. Only rounding errors are allowed.
 TEST(GeometryTable, DerivativesInClosedFormAreThoseOfPlus) {
   const auto visit = [&]<class G>(G) {
     const Geometry geometry = Geometry::Of<G>();

@@ -8,13 +8,13 @@
 namespace alidade {
 namespace {
 
-constexpr double kProductTolerance = 1e-12;  // for sums of about 10 products of numbers of order 10
+constexpr double kProductTolerance = 1e-12;  // sums of 10 products of order 100
 
 TEST(Projection, EqualsTheDenseProduct) {
   Random random(4);
   Covariance p = RandomCovariance({3, 4, 2, 11, 9, 1, 70}, random);
   p.Release(9, 11);  // these rows and columns become zero
-  // The columns have any order. One column occurs twice.
+  // The columns are in arbitrary order. One of the lists contains a column twice.
   for (const std::vector<int>& columns :
        {std::vector{5}, {0, 1, 2}, {25, 3, 99, 4}, {4, 30, 4, 22, 21}}) {
     for (const int m : {1, 2, 5}) {

@@ -20,7 +20,7 @@ void Move(State& state, const Eigen::VectorXd& dx) {
 
 Space Named(const Geometry& geometry) { return {"value", "m", "", {""}, geometry, 0}; }
 
-/// Returns a state with the correlated blocks a (2 elements), b (1) and c (2).
+/// Returns a state with the correlated blocks a (2 elements), b (1 element) and c (2 elements).
 State Abc() {
   State state;
   const double zero[2] = {1.0, 2.0};
@@ -221,7 +221,7 @@ TEST(State, MoveToTransportsTheCovarianceOfADirection) {
 TEST(StateLayout, ABlockIsDeclaredLikeAnotherOfTheSameLayout) {
   StateLayout layout;
   layout.Declare("s.a", "s", Named(Geometry::UnitQuaternion()));
-  for (int i = 0; i < 20; ++i) {  // declares so many blocks that they are reallocated
+  for (int i = 0; i < 20; ++i) {  // declares enough blocks to cause a reallocation
     const Block& first = layout[0];
     const BlockId id = layout.Declare("s." + std::to_string(i), first.owner, first.space);
     EXPECT_EQ(layout[id].owner, "s");

@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::MatrixXd;
 
-/// Sizes below, at and above the size of one tile, and of two tiles.
+/// Sizes below, at and above the size of one tile, and a size above that of two tiles.
 constexpr Eigen::Index kSizes[] = {0, 1, 5, kTile - 1, kTile, kTile + 1, 2 * kTile + 7};
 
 TEST(Tiles, ProductsAreThoseOfWholeMatrices) {

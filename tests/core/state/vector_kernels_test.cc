@@ -21,7 +21,7 @@ MatrixXd Drawn(Eigen::Index rows, Eigen::Index columns, Random& random) {
   return m;
 }
 
-/// Returns the largest difference of two matrices, divided by the largest element of the second.
+/// Returns the largest difference of two matrices, divided by 1 plus the largest element of `b`.
 double Difference(const MatrixXd& a, const MatrixXd& b) {
   if (b.size() == 0) return 0.0;
   return (a - b).cwiseAbs().maxCoeff() / (1.0 + b.cwiseAbs().maxCoeff());

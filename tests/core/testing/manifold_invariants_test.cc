@@ -25,8 +25,8 @@ TEST(ManifoldInvariants, HoldForStepsBelowHalfATurn) {
 
 // 4 rad and 4 - 2 pi rad lead to the same angle, so the error is 2 pi.
 TEST(ManifoldInvariants, AStepBeyondHalfATurnIsNamed) {
-  EXPECT_EQ(Failure(Geometry::Angle(), {0.0}, {4.0}, {1.0}).substr(0, 64),
-            "(2) (x (+) d) (-) x = d does not hold for angle: off by 6.283185");
+  EXPECT_EQ(Failure(Geometry::Angle(), {0.0}, {4.0}, {1.0}).substr(0, 70),
+            "(2) (x (+) d) (-) x = d does not hold for angle: the error is 6.283185");
 }
 
 TEST(ManifoldInvariants, APointOffTheManifoldIsNamed) {

@@ -28,14 +28,14 @@ struct Titled : Probe {
     p.Fail("", (title + '|' + needed).c_str());  // makes the parameters visible to the test
   }
 };
-/// Tries to insert a line of its own into the messages of the program.
+/// A model that tries to insert a line of its own into the messages of the program.
 struct Forges : Probe {
   explicit Forges(alidade::Params& p) : Probe(p) {
     p.Fail("forged\nerror: key", "one\nerror: two \033[31m\xff \u03bb");
   }
 };
-/// Reads one parameter more than the maximum number. Without `distinct` it reads the same parameter
-/// each time.
+/// A model that reads one parameter more than the maximum number. If `distinct` is false, the model
+/// reads the same parameter each time.
 struct AsksMuch : Probe {
   explicit AsksMuch(alidade::Params& p) : Probe(p) {
     const bool distinct = p.Flag("distinct", "");

@@ -145,7 +145,7 @@ struct Moved : MotionBase {
 #elif BAD_MEMBER == 18
   static constexpr double kStepOrder = 2.0;
 #elif BAD_MEMBER == 19
-  int kStepOrder = 2;  // not of the declared type
+  int kStepOrder = 2;  // not static constexpr
 #elif BAD_MEMBER == 24
   bool noise_kind() const { return true; }
 #endif

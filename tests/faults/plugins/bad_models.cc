@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models for tests/plugins/host/check_test.cc. Five of them have no fault; each of the others has
-// one fault.
+// Models for tests/plugins/host/check_test.cc. Five of these models have no fault. Each of the
+// other models has one fault.
 #include <unistd.h>
 
 #include <cfenv>
@@ -25,8 +25,8 @@ using alidade::Vec;
 
 namespace {
 
-volatile int g_calls = 0;  // used by the models with hidden state
-// volatile, so that the compiler does not evaluate the faults at compile time.
+volatile int g_calls = 0;  // counts calls in the models with hidden state
+// These variables are volatile, so the compiler cannot evaluate the faults at compile time.
 volatile double g_zero = 0.0;
 volatile int g_first = 0;
 
@@ -104,7 +104,7 @@ struct HiddenState : Right {
   template <class T>
   bool Predict(const T* x, const T* y, T* z) const {
     if (!Right::Predict(x, y, z)) return false;
-    // The value part of x[0], also if x[0] is a dual number.
+    // Reads the value part of x[0], even if x[0] is a dual number.
     const double now = *reinterpret_cast<const double*>(x);
     if (now != last) {
       before = last;
@@ -258,7 +258,7 @@ struct LosesItself : Right {
 using Seen = AlidadeObservation;
 using Eval = decltype(AlidadeSensor::eval);
 
-/// Makes the correct model with another evaluation function.
+/// Creates the correct model with another evaluation function.
 template <Eval kEval>
 void MakeRaw(Params& p, AlidadeInstance* instance) {
   static AlidadeSensor calls = alidade::detail::SensorCalls<Right>::kCalls;
@@ -283,7 +283,7 @@ std::int32_t WritesItsInput(const void*, const Seen*, const double* const* x, do
   const_cast<double*>(x[1])[0] += 1.0;
   return code;
 }
-/// Ignores the strides: writes the rows of a Jacobian directly one after the other.
+/// Ignores the strides: writes the rows of a Jacobian without gaps.
 std::int32_t IgnoresStrides(const void*, const Seen*, const double* const* x, double* z,
                             double* const* j, const std::int32_t*) {
   const std::int32_t dense[] = {1, 1};
@@ -391,8 +391,8 @@ struct TwoCovers : alidade::Sensor<Vec<1>, UnitQuaternion> {
   }
 };
 
-/// Measures z = (x, q). -q is the same rotation as q, but the inverse model computes another x from
-/// it.
+/// Measures z = (x, q). -q is the same rotation as q, but the inverse model computes a different x
+/// from -q.
 struct TwoCoversOfAPart
     : alidade::Sensor<alidade::Product<Vec<1>, UnitQuaternion>, Vec<1>, UnitQuaternion> {
   static constexpr std::array kRoles{Quantity{"x", "m"}, Quantity{"orientation"}};
@@ -438,14 +438,14 @@ struct Turning : alidade::Motion<4, Vec<1>, UnitQuaternion> {
   }
 };
 
-/// Makes an Euler step but declares the order kOrder.
+/// Performs an Euler step but declares the order kOrder.
 template <int kOrder>
 struct Declared : Turning<2> {
   using Turning<2>::Turning;
   static constexpr int kStepOrder = kOrder;
 };
 
-/// A point with noise. kWhat selects the kind of its noise and the kind that it declares.
+/// Motion model of a point with noise. kWhat selects the kind of the noise and the declared kind.
 enum class Noise { kHeld, kHeldUndeclared, kAddsUpUndeclared, kOfEachStep };
 template <Noise kWhat>
 struct Noisy : alidade::Motion<1, Vec<1>, Vec<1>> {

@@ -10,7 +10,7 @@
 
 namespace {
 
-/// Creation fails if another instance is being created at the same time.
+/// A model whose creation fails if another instance is being created at the same time.
 struct Alone : Probe {
   explicit Alone(alidade::Params& p) : Probe(p) {
     static std::atomic<int> inside{0};

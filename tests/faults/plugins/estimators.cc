@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A C++ plugin with two faulty estimators. One throws while its options are read, and one has no
-// factory.
+// A C++ plugin with two faulty estimators. One of them throws while its options are read. The other
+// returns an empty function for creating the estimator.
 #include <stdexcept>
 
 #include "alidade/experiment/estimator_plugin.h"

@@ -32,7 +32,7 @@ struct Walk : alidade::Motion<1, alidade::Vec<1>> {
   void SqrtQ(double dt_s, alidade::MatrixRef l) const { l(0, 0) = std::sqrt(dt_s); }
 };
 
-/// Makes the model Inverse with one faulty function, which kSpoil sets.
+/// Creates the model Inverse with one faulty function, which kSpoil sets.
 template <void (*kSpoil)(AlidadeSensor&)>
 void MakeSensor(alidade::Params& p, AlidadeInstance* instance) {
   static AlidadeSensor calls = alidade::detail::SensorCalls<Inverse>::kCalls;

@@ -4,8 +4,8 @@
 /// A body whose temperature approaches that of its surroundings, by Newton's law of cooling.
 ///
 ///   model      T' = A + (T - A) exp(-dt / tau) + w
-///   noise      w ~ N(0, q^2 tau / 2 (1 - exp(-2 dt / tau))), the exact sum of white noise that
-///              drives dT/dt; adds up: Q does not depend on how dt is split
+///   noise      w ~ N(0, q^2 tau / 2 (1 - exp(-2 dt / tau))), the exact integral of white noise
+///              that drives dT/dt; Q does not depend on how dt is split
 ///   Jacobian   F = exp(-dt / tau)                      1x1, by automatic differentiation
 ///
 ///   symbol     shape  unit       meaning
@@ -20,7 +20,7 @@ struct Cooling : alidade::Motion<1, alidade::Vec<1>> {
 
   explicit Cooling(alidade::Params& p)
       : ambient(p.Number("ambient_degc", "degC", "temperature of the surroundings")),
-        tau_s(p.Positive("time_constant_s", "s", "in which the difference falls to 37 %")),
+        tau_s(p.Positive("time_constant_s", "s", "time to fall to 37 %")),
         density(p.NonNegative("noise.density", "degC/s^0.5", "density of the driving noise")) {}
 
   template <class T>

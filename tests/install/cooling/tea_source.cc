@@ -7,7 +7,8 @@
 
 namespace {
 
-/// A cup of tea at 80 degC cools in a room at 20 degC. Its temperature is read once a second.
+/// A cup of tea at 80 degC cools in a room at 20 degC. The temperature of the tea is read once a
+/// second.
 class Tea : public alidade::Source {
  public:
   explicit Tea(const alidade::SourceArguments& arguments)

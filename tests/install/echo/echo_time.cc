@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/model/plugin.h"
 
-/// Measures the time from a pulse to its echo. The emitter and the microphone are at two places.
+/// Measures the time from a pulse to its echo. The emitter and the microphone are at different
+/// places.
 ///
 ///   model      t = 2 sqrt(Z^2 + (b/2)^2) / c + n,   n ~ N(0, sigma^2)
 ///   Jacobian   automatic differentiation               1x1, s/m

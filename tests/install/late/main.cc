@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Filters late measurements. The apparent size of the target arrives at once, but the disparity of
-// an image arrives 0.1 s after the image.
+// Filters late measurements. The apparent size of the target arrives without delay, but the
+// disparity of an image arrives 0.1 s after the image.
 #include <alidade/estimation.h>
 #include <alidade/motion_models/constant.h>
 #include <alidade/motion_models/constant_velocity.h>

@@ -73,8 +73,8 @@ bool SharesTheHeap(const alidade::Ekf& ekf) {
 
 }  // namespace
 
-// Returns 0 if a filter of the library equals the scalar Kalman filter with the compiler flags of
-// this program: P' = P + 1, K = P' / (P' + 1), x' = x + K (z - x), P = P' - K P'.
+// Returns 0 if a filter of the library, compiled with the flags of this program, equals the scalar
+// Kalman filter: P' = P + 1, K = P' / (P' + 1), x' = x + K (z - x), P = P' - K P'.
 int main() {
   alidade::Ekf ekf(WalkSystem(), {}, {{"seen", 3}});
   double x = 0.0, p = 1.0;

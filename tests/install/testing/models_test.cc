@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests models and a filter in the same way as a user's program.
+// Tests models and a filter in the same way as the program of a user.
 #include <alidade/estimation.h>
 #include <alidade/motion_models/constant_velocity.h>
 #include <alidade/sensors/stereo_disparity.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Comparisons with the batch estimator.
+// Tests comparisons with the batch estimator.
 #include <Eigen/LU>
 #include <cmath>
 
@@ -15,8 +15,8 @@ using testing::LinearSystem;
 using testing::MakeBatch;
 using testing::Shipped;
 
-/// Source with a point at cos t. Every fourth frame has no measurement. Measurements have an
-/// oscillating error. Optionally, one is an outlier.
+/// A source that measures a point at cos t. Every fourth frame has no measurement. Measurements
+/// have an oscillating error. If `with_outlier` is true, one measurement is an outlier.
 class Swing : public Source {
  public:
   explicit Swing(bool with_outlier = false) : with_outlier_(with_outlier) {}
@@ -143,8 +143,8 @@ TEST(CompareLinear, TheLastEstimateOfAFilterIsThatOfTheBatch) {
   EXPECT_NEAR(ekf.ratios.at("final_error:p.x").value(), 1.0, 1e-7);
 }
 
-/// Values of p.x and p.v of the filter and of the smoother, and their covariance for the smoother,
-/// by frame.
+/// Values of p.x and p.v for each frame, computed by hand: those of the filter, and those of the
+/// smoother with their covariance.
 struct ByHand {
   std::vector<Eigen::Vector2d> filter, smoother;
   std::vector<Eigen::Matrix2d> p;
@@ -171,7 +171,7 @@ ByHand RunByHand() {
 }
 
 // Compares the distance between a filter and a smoother, in joint sigmas of position and velocity,
-// with that calculated here.
+// with the distance computed here.
 TEST(CompareLinear, DistancesAreThoseWrittenOut) {
   const ByHand by_hand = RunByHand();
   double squares = 0.0, sigmas = 0.0;
@@ -258,11 +258,11 @@ TEST(BuildComparedExperiment, LeavesOutWithItsReasonWhatDoesNotSupportTheSystem)
   EXPECT_TRUE(compared.added.empty());
   ASSERT_EQ(compared.notes.size(), 2u);
   EXPECT_TRUE(
-      compared.notes[0].starts_with("left out the batch of all data; the full-information filter "
-                                    "of the accepted measurements; "))
+      compared.notes[0].starts_with("the comparison omits the batch of all data; the "
+                                    "full-information filter of the accepted measurements; "))
       << compared.notes[0];
   EXPECT_EQ(compared.notes[1],
-            "left out the smoother of all data: estimator type 'rts' does not support "
+            "the comparison omits the smoother of all data: estimator type 'rts' does not support "
             "jacobian_at: measurement");
   EXPECT_EQ(compared.experiment.estimators.size(), 1u);
 }
@@ -277,8 +277,10 @@ TEST(BuildComparedExperiment, RefusesNamesThatAreNotThereOrNoFilters) {
       EXPECT_TRUE(std::string(error.what()).starts_with(words)) << error.what();
     }
   };
-  refuses({"bath", "", true}, "--reference: no estimator 'bath'; expected one of ekf, rts");
-  refuses({"", "efk", true}, "--filter: no estimator 'efk'; expected one of ekf; did you mean");
+  refuses({"bath", "", true},
+          "--reference: no estimator has the name 'bath'; expected one of ekf, rts");
+  refuses({"", "efk", true},
+          "--filter: no estimator has the name 'efk'; expected one of ekf; did you mean");
 }
 
 TEST(BuildComparedExperiment, RefusesToExplainTheGapOfABatchOrASmoother) {
@@ -312,7 +314,7 @@ Comparison CompareScene(const std::string& more) {
   return comparer.Finish(run, {});
 }
 
-// The full-information filter `now` solves at every frame. Its estimate at the last frame equals
+// The full-information filter `now` solves at every frame. At the last frame, its estimate equals
 // that of the batch.
 TEST(CompareLandmarks, AtTheLastFrameTheBatchOfAllDataIsThatOfTheDataSoFar) {
   const DecompositionStep step = CompareScene("").decomposition[0];
@@ -361,8 +363,8 @@ TEST(CompareSeeds, WhatIsHeldAgainstAReferenceThatDivergedIsLeftOut) {
     EXPECT_EQ(ValueOf(ukf.values, key), ValueOf(second.estimators[1].values, key)) << key;
   }
   EXPECT_EQ(both.withheld,
-            "no reference: estimator 'ekf' failed, the comparison with it is withheld (1 of 2 "
-            "runs)");
+            "no reference is available: estimator 'ekf' failed, so the comparison with this "
+            "estimator is withheld (1 of 2 runs)");
   const std::string text = CompareReport(both, TableStyle::kText);
   EXPECT_NE(text.find("ratios and differences relative to ekf"), text.npos) << text;
   EXPECT_NE(text.find("runs with a reference"), text.npos) << text;

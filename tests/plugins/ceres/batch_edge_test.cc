@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "batch_landmarks_fixture.h"
 
-/// Tests of landmarks whose optimum in a sparse batch is at the boundary of the domain of their
-/// model.
+/// Tests landmarks whose optimum in a sparse batch is at the boundary of the domain of their model.
 namespace alidade {
 namespace {
 
@@ -25,8 +24,8 @@ struct OffsetBeyond : testing::Offset {
   }
 };
 
-/// Returns the measurements of landmarks 7 and 8. According to its measurements, landmark 7 leaves
-/// its domain, or stays inside if `inside` is true.
+/// Returns the measurements of landmarks 7 and 8. If `inside` is true, landmark 7 stays inside its
+/// domain. Otherwise its measurements imply a position outside the domain.
 std::vector<std::array<Vector3d, 2>> OffsetsOf(bool inside) {
   std::vector<std::array<Vector3d, 2>> seen;
   for (int k = 0; k < kViews; ++k) {
@@ -148,8 +147,8 @@ TEST(CeresBatchEdge, WindowsAndFullInformationNameItOnce) {
   }
 }
 
-/// Sensor z = exp(-r_z). The first Gauss-Newton step is much too long; each of the next ones
-/// returns by 1 m.
+/// Sensor z = exp(-r_z). The first Gauss-Newton step is much too long. Each of the next steps goes
+/// back by 1 m.
 struct Exponential : Sensor<Vec<1>, Vec<3>> {
   static constexpr std::array kRoles{testing::kPosition};
   static constexpr Quantity kMeasurement{"z", "", "", ""};

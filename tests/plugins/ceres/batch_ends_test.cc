@@ -8,7 +8,8 @@
 #include "support/comma_locale.h"
 #include "support/landmark_models.h"
 
-/// Tests of the start and the end of a batch, and of its reports if it does not reach the optimum.
+/// Tests the start and the end of a batch, and the reports of a batch that does not reach the
+/// optimum.
 namespace alidade {
 namespace {
 
@@ -18,8 +19,8 @@ using testing::LinearSystem;
 using testing::MakeBatch;
 using testing::Shipped;
 
-// The first frame does not measure the velocity. Its variance is therefore that after the step from
-// the start to the first frame.
+// The first frame does not measure the velocity. The variance of the velocity is therefore the one
+// after the step from the start to the first frame.
 TEST(CeresBatchEnds, StartsAtTheGivenTime) {
   const Problem problem = LinearSystem();
   const auto so_far = MakeBatch(problem, "mode: filtering\n"), batch = MakeBatch(problem);
@@ -60,7 +61,7 @@ TEST(CeresBatchEnds, InputsOfFirstValuesCountToo) {
 
 TEST(CeresBatchEnds, TimesReadTheSameInEveryLocale) {
   const testing::CommaLocale locale;
-  if (!locale.active()) GTEST_SKIP() << "localedef made no locale";
+  if (!locale.active()) GTEST_SKIP() << "localedef is not available";
   const auto batch = MakeBatch(LinearSystem(), "max_dt_s: 0.001\n");
   batch->Process(FrameAt(0.0, {}));
   const UpdateReport& report = batch->Process(FrameAt(1010.5, {}));
@@ -71,7 +72,7 @@ TEST(CeresBatchEnds, TimesReadTheSameInEveryLocale) {
 
 // ---- a model that fails -------------------------------------------------------------------------
 
-/// Random walk that fails after `budget` steps.
+/// Motion model of a random walk that fails after `budget` steps.
 struct Failing : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x", "m"}};
   static inline int budget = 0;
@@ -100,7 +101,8 @@ void ExpectSaid(const Problem& problem, int budget, bool so_far) {
     said += e.what();
   }
   EXPECT_TRUE(batch->failed()) << budget << ' ' << said;
-  EXPECT_NE(said.find("motion model of 'p' cannot predict the state: the state is out of domain"),
+  EXPECT_NE(said.find("motion model of 'p' cannot predict the state: the state is outside the "
+                      "domain of the model"),
             std::string::npos)
       << budget << ' ' << said;
 }
@@ -123,8 +125,9 @@ TEST(CeresBatchEnds, AModelThatFailsAtTheEndIsSaid) {
   }
 }
 
-// The filter of the batch cannot step to the second frame, but the batch can do so later. A block
-// that waits for its initial value never gets one. The events report this once.
+// The filter of the batch cannot step to the second frame, but the batch can make this step later.
+// The block that waits for its initial value never receives one. The events report the end of the
+// filter once.
 TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
   Problem problem;
   testing::AddMotion(problem, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
@@ -143,8 +146,8 @@ TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
   }
   ASSERT_EQ(said.size(), 1u);
   EXPECT_EQ(said[0].find("the filter that the batch starts from, and that gives blocks their first "
-                         "values, ended: motion model of 'p' cannot predict the state: the state "
-                         "is out of domain"),
+                         "values, ended: the motion model of 'p' cannot predict the state: the "
+                         "state is outside the domain of the model"),
             0u)
       << said[0];
   std::vector<Outcome> outcomes;
@@ -251,7 +254,7 @@ TEST(CeresBatchEnds, TooFewIterationsNameTheKeyThatAllowsMore) {
       << said;
 }
 
-/// Sensor z = x^2. Its Jacobian can have the wrong sign.
+/// Sensor z = x^2, whose Jacobian can have the wrong sign.
 struct WrongSign : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x", "m"}};
   static constexpr Quantity kMeasurement{"z", "m2"};
@@ -307,7 +310,7 @@ TEST(CeresBatchEnds, ALossTakesNoStepUphill) {
   };
   const auto [expected, none] = last_of({});
   const auto [found, said] = last_of({LossKind::kHuber, 1e9});
-  EXPECT_NEAR(found / expected, 1.0, 1e-4) << said;  // both 1e8, rounded to 1e-4
+  EXPECT_NEAR(found / expected, 1.0, 1e-4) << said;  // both are about 1e8, rounded to 1e-4
   EXPECT_EQ(said.find("not_converged: the weights of the losses did not settle in 0 steps: "), 0u)
       << said;
   EXPECT_NE(said.find("it does not lower the cost\n"), std::string::npos) << said;
@@ -317,7 +320,7 @@ TEST(CeresBatchEnds, ALossTakesNoStepUphill) {
 
 constexpr double kSigma = 2e-3;  // rad
 
-/// Random walk n' = n (+) w.
+/// Motion model of a random walk n' = n (+) w.
 struct Wander : Motion<2, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"n", "", "", "x,y,z"}};
   template <class T>
@@ -341,8 +344,8 @@ struct Seen : Sensor<UnitVector, UnitVector> {
 };
 
 // The tangent basis changes at z = 0, which this walk crosses. The smoother linearises at the
-// estimates of the filter, so it differs from the batch. At z = 0.6, far from the change, both also
-// differ: by 5e-6 sigma, and by up to 8e-4 in P.
+// estimates of the filter, so it differs from the batch. At z = 0.6, far from the change, the two
+// also differ: by 5e-6 sigma, and by up to 8e-4 in P.
 TEST(CeresBatchEnds, AUnitVectorMayCrossTheSeamOfItsBasis) {
   Problem problem;
   const SharedMotion wander = MakeMotion(Wander(), "wander");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of the batch and the fixed-lag smoother with a given noise in place of the noise of the
+// Tests the batch and the fixed-lag smoother with a given noise that replaces the noise of the
 // models.
 #include <cmath>
 
@@ -13,7 +13,7 @@ namespace {
 using testing::FrameAt;
 
 /// Returns a problem with a held acceleration of 0.7 m/s^2 and a sensor noise of 0.3 m. If `given`
-/// is true, the models have other noises, which given noises of these sizes replace.
+/// is true, the models have other noises, and given noises of these sizes replace them.
 Problem HeldNoise(bool given) {
   Problem problem = testing::HeldPoint(given ? 5.0 : 0.7);
   if (given) {

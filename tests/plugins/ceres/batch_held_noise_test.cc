@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of the batch and the fixed-lag smoother over gaps that are split into steps. Held noise is
-// one input of each gap.
+// Tests the batch and the fixed-lag smoother over gaps that are split into steps. Held noise is a
+// single input for each gap.
 #include <cmath>
 
 #include "alidade/estimation/rts.h"
@@ -120,8 +120,8 @@ TEST(CeresBatchHeldNoise, ALinearWindowIsTheFilterAtEveryFrame) {
   }
 }
 
-// 1000 gaps are split into 10 parts each. They have 2 inputs for the prior and one for each gap,
-// less than the limit of 4000.
+// 1000 gaps are split into 10 parts each. The batch has 2 inputs for the prior and 1 input for each
+// gap, fewer than the limit of 4000.
 TEST(CeresBatchHeldNoise, HasOneInputForEachGap) {
   const auto batch = Make("ceres_batch", "max_dt_s: 0.011\n");
   const std::vector<Frame> frames = Frames(1001, 2);

@@ -55,8 +55,8 @@ inline Found Solve(const Problem& problem, const std::vector<Frame>& frames,
 
 inline constexpr double kPixel = 0.004, kRho = 0.5, kRhoSigma = 0.15, kWalk = 0.1, kDt = 0.1;
 
-/// Problem of a camera that moves in front of points, with its measurements, for MapSystem(). The
-/// vector x contains the positions of the camera, r_1.., and the points p_0.., with 3 numbers each.
+/// Problem of MapSystem() with measurements: a camera moves in front of points. The vector x
+/// contains the positions of the camera, r_1.., and the points p_0.., with 3 numbers each.
 struct MapProblem {
   int steps, points;
   std::vector<Frame> frames;
@@ -165,8 +165,8 @@ struct MapProblem {
     }
     return x;
   }
-  /// Expects that `found` is the minimum of the cost of this problem, and has the covariance at
-  /// this minimum.
+  /// Expects that `found` is the minimum of the cost of this problem and has the covariance at this
+  /// minimum.
   void ExpectSolved(const Found& found) const {
     ASSERT_FALSE(found.failed);
     ASSERT_EQ(found.states.size(), frames.size());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of the landmarks of a batch, and of the motion of its camera.
+// Tests the landmarks of a batch and the motion of its camera.
 #include <map>
 #include <string>
 

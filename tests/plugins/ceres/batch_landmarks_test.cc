@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of the batch with landmarks. It is compared with least squares in the states, calculated
-// here.
+// Tests the batch with landmarks. Compares it with the least-squares solution for the states,
+// computed here.
 #include "batch_landmarks_fixture.h"
 
 namespace alidade {
@@ -23,8 +23,8 @@ using testing::Observation;
 using testing::Offset;
 using testing::Solve;
 
-/// Normal equations of positions x_0, x_1, .., with 3 numbers each, that measured differences
-/// determine.
+/// Normal equations of the positions x_0, x_1, .., with 3 numbers each. Measured differences
+/// determine the positions.
 struct Differences {
   MatrixXd information;
   VectorXd right;
@@ -98,8 +98,8 @@ TEST(CeresBatchLandmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
   }
 }
 
-// For data without landmarks, a problem that may have landmarks has the same solution as one that
-// has none.
+// For data without landmarks, a problem that may have landmarks has the same solution as a problem
+// that cannot have landmarks.
 TEST(CeresBatchLandmarks, WithoutAnyTheSolutionIsThatOfTheProblemWithoutThem) {
   const auto expect_equal = [](const Problem& problem, const std::vector<Frame>& frames,
                                double tolerance) {

@@ -39,7 +39,7 @@ Solution SmoothOver(const Problem& problem, const std::vector<Frame>& frames) {
 
 constexpr double kGain = 2.0, kSigma = 0.3, kAcceleration = 0.7, kStep = 0.05;
 
-/// Returns the problem of a moving point with a linear sensor. Its priors are p.x ~ N(1, 2^2) and
+/// Returns the problem of a moving point with a linear sensor. The priors are p.x ~ N(1, 2^2) and
 /// p.v ~ N(-0.5, 3^2).
 Problem PointWith(const RobustLoss& loss) {
   Problem problem = testing::MovingPoint(kAcceleration);
@@ -60,8 +60,8 @@ std::vector<Frame> FramesWithOutliers(int count) {
 }
 
 /// Solves iteratively reweighted least squares by normal equations. The unknowns u are the two
-/// deviations from the prior's mean, and the acceleration of each step. All are scaled to N(0, 1):
-/// x_k = c_k + M_k u.
+/// deviations from the mean of the prior, and the acceleration of each step. All unknowns are
+/// scaled to N(0, 1): x_k = c_k + M_k u.
 Solution Reweighted(const RobustLoss& loss, const std::vector<Frame>& frames) {
   const auto count = std::ssize(frames), n = count + 1;
   std::vector<Eigen::MatrixXd> m;
@@ -105,7 +105,7 @@ Solution Reweighted(const RobustLoss& loss, const std::vector<Frame>& frames) {
   return solution;
 }
 
-// Compares the batch with an independent solution of the same problem. 7 of its 60 measurements are
+// Compares the batch with an independent solution of the same problem. 7 of the 60 measurements are
 // outliers of 13 sigma.
 TEST(CeresBatchLoss, EqualsIterativelyReweightedLeastSquares) {
   const std::vector<Frame> frames = FramesWithOutliers(60);
@@ -136,7 +136,8 @@ TEST(CeresBatchLoss, OfTheDataSoFarEndsWhereTheSmootherDoes) {
 }
 
 // Two contradictory values cost 1e11 for every position of the point. The solver therefore ends
-// early, when the cost falls by less than 1e-14 of itself. The weights have to settle afterwards.
+// early, when the cost falls by less than 1e-14 of its value. The weights have to settle
+// afterwards.
 TEST(CeresBatchLoss, WeightsThatDoNotSettleAreSaid) {
   Problem problem = PointWith({LossKind::kHuber, 0.3});
   testing::AddMotion(problem, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
@@ -231,8 +232,8 @@ struct DirectPair : Sensor<Vec<2>, Vec<2>> {
   }
 };
 
-// The loss applies to d^2 = r' R^-1 r of both elements together. Each measurement has an R with
-// correlation.
+// The loss applies to d^2 = r' R^-1 r of both elements together. Each measurement has a correlated
+// R.
 TEST(CeresBatchLoss, IsOnTheWholeWhitenedResidual) {
   const RobustLoss loss{LossKind::kHuber, 1.5};
   Problem problem;
@@ -271,8 +272,8 @@ TEST(CeresBatchLoss, IsOnTheWholeWhitenedResidual) {
 
 // ---- a run --------------------------------------------------------------------------------------
 
-/// Source in which every eighth value of each stream is an outlier: too large by 20 px, or by a
-/// fifth.
+/// A source in which every eighth value of each stream is an outlier. Outliers are too large by 20
+/// px in one stream, and by a fifth in the other stream.
 class WithOutliers : public Source {
  public:
   explicit WithOutliers(std::unique_ptr<Source> source) : source_(std::move(source)) {}
@@ -291,8 +292,8 @@ class WithOutliers : public Source {
   int count_ = 0;
 };
 
-/// Returns the RMSE of the depth, m, of an ekf without a gate and of the batch, in example 05 with
-/// outliers.
+/// Returns the RMSE of the depth, in m, of an ekf without a gate and of the batch, in example 05
+/// with outliers.
 std::vector<double> DepthErrors(bool robust) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/05_depth_principled/config.yaml");
   config.Set("estimators", "{ekf: {type: ekf}, batch: {type: ceres_batch}}", "--set");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of problems without a noise input. They have neither an uncertain prior nor process noise,
-// so there is nothing to solve for.
+// Tests problems without a noise input. These problems have neither an uncertain prior nor process
+// noise, so there is nothing to solve for.
 #include <cmath>
 
 #include "alidade/experiment/estimator_plugin.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of the batch with sensors that have their own states, known numbers or several parts. On a
+// Tests the batch with sensors that have their own states, known numbers or several parts. On a
 // nearly linear problem the batch equals the smoother.
 #include <gtest/gtest.h>
 
@@ -47,7 +47,7 @@ TEST(BatchSensorStates, OfAClockAmongSatellitesIsTheSmoother) {
 }
 
 // The orientation has errors of about 0.006 rad, rotated by 0.3 rad. The smoother linearises at the
-// estimates of the filter. It therefore differs from the optimum by a few thousandths of the
+// estimates of the filter, so the smoother differs from the optimum by a few thousandths of the
 // errors.
 TEST(BatchSensorStates, OfPosesIsTheSmoother) {
   const RunResult run = RunOf(

@@ -46,7 +46,7 @@ void ExpectSame(const Found& found, const Found& expected, double states = kStat
   EXPECT_NE(found.events.back().text.find("sparse"), std::string::npos);
   EXPECT_EQ(expected.events.back().text.find("sparse"), std::string::npos);
   EXPECT_NEAR(CostOf(found), CostOf(expected),
-              2e-8 * (1.0 + CostOf(expected)));  // nine digits
+              2e-8 * (1.0 + CostOf(expected)));  // the cost is printed with nine digits
   ASSERT_EQ(found.states.size(), expected.states.size());
   double worst_x = 0.0, worst_p = 0.0;
   for (std::size_t k = 0; k < found.states.size(); ++k) {
@@ -141,7 +141,7 @@ Config Example(const std::string& name) {
   return Config::FromFile(ALIDADE_SOURCE_DIR "/examples/" + name + "/config.yaml");
 }
 
-// The noise has rank 1 of 2, or rank 0. The prior is uncertain, or exact partly or entirely.
+// The noise has rank 1 (of 2) or rank 0. The prior is uncertain, partly exact, or entirely exact.
 TEST(SparseBatch, NoiseAndPriorMayHaveAnyRank) {
   for (const double acceleration : {0.7, 0.0}) {
     for (const double sigma_x : {2.0, 0.0}) {
@@ -158,7 +158,7 @@ TEST(SparseBatch, NoiseAndPriorMayHaveAnyRank) {
 }
 
 // The variance of the first velocity is 1e10 times smaller than that of its prior. The batch must
-// not compute it as a difference of two numbers of the size of the prior.
+// not compute this variance as a difference of two numbers of the size of the prior.
 TEST(SparseBatch, AVagueStartCostsNoDigits) {
   Problem problem = testing::LinearSystem();
   for (std::size_t i = 0; i < problem.priors.size(); ++i) SetPrior(problem, i, 1e4);
@@ -175,7 +175,8 @@ TEST(SparseBatch, WhereAllIsKnownNothingIsSolved) {
   EXPECT_EQ(testing::ValueOf(found.states.back(), "p.x"), 2.0);
 }
 
-// The noise is held over frames without a measurement. These frames therefore lie inside a node.
+// The noise is held over frames without a measurement. The sparse system therefore has no variables
+// of its own for these frames.
 TEST(SparseBatch, FramesBetweenMeasurementsHaveTheirCovariance) {
   Problem problem = testing::HeldPoint(0.7);
   testing::AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
@@ -213,9 +214,9 @@ TEST(SparseBatch, SolvesTheExamplesWithoutAMap) {
   }
 }
 
-/// Problem and data of a body with an inertial unit at 100 Hz and a position sensor, +- 0.1 m, at 2
-/// Hz. The model generates the trajectory from the readings of the unit, which have biases and
-/// noise.
+/// Problem and data of a body with an inertial unit at 100 Hz and a position sensor at 2 Hz. The
+/// noise of the position sensor is 0.1 m. The model generates the trajectory from the readings of
+/// the unit, which have biases and noise.
 struct InertialRun {
   Problem problem;
   std::vector<Frame> frames;
@@ -277,7 +278,7 @@ struct InertialRun {
   }
 };
 
-// The dense solver can solve 0.8 s of data, but not a minute, which has 72 015 inputs.
+// The dense solver can solve 0.8 s of data, but not 60 s of data, which have 72 015 inputs.
 TEST(SparseBatch, SolvesInertialReadings) {
   const InertialRun little(80);
   ExpectSame(little.Solve("solver: sparse\n"), little.Solve("solver: dense\n"));
@@ -365,8 +366,8 @@ TEST(SparseBatch, SolvesWithStereoPairs) {
 }
 
 // With a few frames the prior dominates the depths. A Gauss-Newton step is then more than twice too
-// long, and the next step returns as far. Extrapolation from the last few steps makes the solver
-// converge.
+// long, and the next step goes back by nearly the same length. Extrapolation from the last few
+// steps makes the solver converge.
 TEST(SparseBatch, ConvergesWhereStepsGoTooFar) {
   Config config = Example("16_slam_room");
   config.Set("source.seed", "1001", "--set");
@@ -457,8 +458,8 @@ TEST(SparseBatch, TheMotionHoldsToRounding) {
   }
 }
 
-// 5002 inputs exceed the limit of a dense system, so the sparse solver is used. A Kalman filter has
-// the same last estimate.
+// 5002 inputs exceed the limit of a dense system, so the sparse solver is used. The last estimate
+// equals that of a Kalman filter.
 TEST(SparseBatch, IsTakenWhereThereAreManyInputs) {
   const Problem problem = testing::LinearSystem();
   const std::vector<Frame> frames = Wobble(5001);

@@ -58,8 +58,8 @@ struct LinearRow {
 };
 
 /// Computes a Kalman filter and a Rauch-Tung-Striebel smoother: P' = F P F' + Q, C = P F' P'^-1,
-/// x_s = x + C (x_s' - x'), P_s = P + C (P_s' - P') C'. The first two elements are a position and
-/// its constant velocity; the others are constant.
+/// x_s = x + C (x_s' - x'), P_s = P + C (P_s' - P') C'. The first element is a position, and the
+/// second element is its constant velocity. The other elements are constant.
 Smoothed WrittenOut(Eigen::VectorXd x, Eigen::MatrixXd p, double acceleration,
                     const std::vector<Frame>& frames,
                     const std::vector<std::vector<LinearRow>>& rows) {
@@ -104,7 +104,7 @@ void ExpectNear(const Smoothed& found, const Smoothed& expected, double toleranc
   }
 }
 
-// The process noise has rank 1 of 2: G = (dt^2/2, dt).
+// The process noise of the two elements has rank 1: G = (dt^2/2, dt).
 TEST(CeresBatch, EqualsTheSmootherWrittenOutOnALinearProblem) {
   const std::vector<Frame> frames = LinearFrames(60);
   std::vector<std::vector<LinearRow>> rows(frames.size());
@@ -126,8 +126,8 @@ TEST(CeresBatch, EqualsTheSmootherWrittenOutOnALinearProblem) {
       << found.events[0].text;
 }
 
-/// Returns frames of a target at the depth 0.3 + 0.1 sin(2.5 t) m. Most frames contain its
-/// disparity (BF = 26 px m), and all contain 1 / scale.
+/// Returns frames of a target at the depth 0.3 + 0.1 sin(2.5 t) m. Most frames contain the
+/// disparity of the target (BF = 26 px m), and all frames contain 1 / scale.
 std::vector<Frame> DepthFrames(int count) {
   std::vector<Frame> frames;
   for (int k = 0; k < count; ++k) {
@@ -265,8 +265,8 @@ TEST(CeresBatch, ABlockMayStartFromAMeasurement) {
   EXPECT_EQ(emitted, frames.size());
 }
 
-// An exactly known block stays constant. It is known exactly if its sigma is zero and it has no
-// process noise, or if it is fixed.
+// An exactly known block stays constant. A block is known exactly if it is fixed, or if it has zero
+// sigma and no process noise.
 TEST(CeresBatch, WhatIsKnownStays) {
   Problem zero = LinearSystem();
   zero.priors[1].covariance.setZero();
@@ -344,7 +344,7 @@ void ExpectStationary(const Geometry& geometry) {
     }
     return sum;
   };
-  // Ceres stops if the cost, which is 20, falls by less than 1e-14 of itself. Then 45 d^2 / 2 =
+  // Ceres stops if the cost, which is 20, falls by less than 1e-14 of its value. Then 45 d^2 / 2 =
   // 2e-13, so the gradient is 45 d = 4e-6. The last step removes most of this gradient. Central
   // differences have an error of 2e-9.
   for (int i = 0; i < t; ++i) EXPECT_NEAR((cost(i, 1e-5) - cost(i, -1e-5)) / 2e-5, 0.0, 1e-6);

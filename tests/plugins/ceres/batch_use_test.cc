@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of a batch that uses the measurements accepted by a filter, and of a batch as the
-// reference.
+// Tests a batch that uses the measurements accepted by a filter, and a batch as the reference.
 #include "alidade/experiment/run.h"
 #include "batch_fixture.h"
 #include "support/recording.h"
@@ -14,8 +13,8 @@ using testing::SwingingTarget;
 
 bool IsOutlier(int k) { return k % 13 == 6; }
 
-/// Swinging target. In some frames the disparity is off by 40 px, or is omitted if `outliers` is
-/// false.
+/// A SwingingTarget. In some frames the disparity is off by 40 px. If `outliers` is false, these
+/// frames have no disparity.
 class WithOutliers : public SwingingTarget {
  public:
   explicit WithOutliers(bool outliers) : SwingingTarget(80), outliers_(outliers) {}
@@ -143,7 +142,8 @@ TEST(CeresBatchUse, ABatchThatDoesNotConvergeIsNoReference) {
                                   {"reference", "batch"}});
   EXPECT_EQ(run.code, ExitCode::kDiverged);
   EXPECT_EQ(run.withheld,
-            "no reference: estimator 'batch' failed, the comparison with it is withheld");
+            "no reference is available: estimator 'batch' failed, so the comparison with this "
+            "estimator is withheld");
   EXPECT_EQ(run.estimators[0].metrics.count("rmse:target.depth"), 0u);
 }
 

@@ -45,7 +45,7 @@ class Chain {
   BlockLdl& ldl() { return ldl_; }
   const Groups& time() const { return time_; }
 
-  /// Sets the elimination order and the values. Also sets the equal dense matrix.
+  /// Sets the elimination order and the values. Also fills the dense matrix with the same values.
   void Fill(const Groups& order) {
     ldl_.Use(Elimination(ldl_.graph(), order));
     Random random(3);
@@ -162,7 +162,7 @@ TEST(MinimumDegree, PutsAHubLast) {
 TEST(MinimumDegree, LeavesTheLastWhereItIs) {
   Chain chain(50, 1, 50);
   Groups groups = chain.time();
-  std::ranges::reverse(groups);  // the last group is then an end of the chain
+  std::ranges::reverse(groups);  // the last group is then one end of the chain
   const Groups ordered = MinimumDegree(chain.ldl().graph(), groups);
   EXPECT_EQ(ordered.back(), groups.back());
   EXPECT_EQ(ordered.size(), groups.size());

@@ -36,7 +36,7 @@ TEST(CeresBundle, FindsCamerasPointsAndIntrinsics) {
   BundleProblem problem = truth;
   Disturb(problem);
   const SharedSensor sensor = BundleSensor(Shipped(), problem);
-  EXPECT_GT(BundleRms(*sensor, problem), 1.0) << "disturbed";
+  EXPECT_GT(BundleRms(*sensor, problem), 1.0) << "the disturbed problem has large residuals";
   const BundleResult result = Adjusted(problem);
   EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
   EXPECT_LT(BundleRms(*sensor, problem), 1e-8);
@@ -61,7 +61,8 @@ TEST(CeresBundle, FindsCamerasPointsAndIntrinsics) {
     for (std::size_t k = 0; k < 3; ++k)
       EXPECT_NEAR(problem.intrinsics[i][k], truth.intrinsics[i][k], k == 0 ? 1e-5 : 1e-7);
   }
-  // Each of 6 cameras has 9 unknowns, but the first only 3. The 40 points have 120 unknowns.
+  // Each of the 6 cameras has 9 unknowns, except the first camera, which has 3. The 40 points have
+  // 120 unknowns.
   EXPECT_EQ(result.unknowns, 5 * 9 + 3 + 120);
   EXPECT_EQ(result.rank, result.unknowns - 1);
   const std::vector<std::string> words = DescribeUndetermined(problem, *sensor, result);
@@ -163,8 +164,8 @@ TEST(CeresBundle, APointFarAwayDoesNotEndIt) {
   EXPECT_NEAR(cost[1] / cost[0], 1.0, 0.1);
 }
 
-/// The scale is restored after the solution, by one product and two sums for each coordinate. It is
-/// therefore accurate to a few epsilon.
+/// The scale is restored after the solution, by one product and two sums for each coordinate. The
+/// restored scale is therefore accurate to a few epsilon.
 TEST(CeresBundle, HoldsTheScaleThatPixelsDoNotTell) {
   BundleProblem problem = TrueBundle().problem;
   testing::AddOutliers(problem);
@@ -324,7 +325,7 @@ TEST(CeresBundle, SolvesALargeProblem) {
   });
   Disturb(problem);
   const SharedSensor sensor = BundleSensor(Shipped(), problem);
-  EXPECT_GT(BundleRms(*sensor, problem), 1.0) << "disturbed";
+  EXPECT_GT(BundleRms(*sensor, problem), 1.0) << "the disturbed problem has large residuals";
   const BundleResult result = Adjusted(problem);
   EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
   EXPECT_EQ(result.unknowns, 119 * 9 + 3 + 1200);
@@ -378,16 +379,16 @@ TEST(CeresBundle, ABuildWithoutThePluginSaysWhatToInstall) {
   }
 }
 
-/// Test of real problems, with the numbers of docs/bundle_adjustment.md.
+/// Tests real problems. The expected numbers are those of docs/bundle_adjustment.md.
 class CeresBundleData : public ::testing::Test {
  protected:
   void SetUp() override {
     const char* const data = std::getenv("ALIDADE_DATA");
-    if (data == nullptr) GTEST_SKIP() << "no ALIDADE_DATA";
+    if (data == nullptr) GTEST_SKIP() << "ALIDADE_DATA is not set";
     folder_ = std::filesystem::path(data) / "bundle-adjustment";
-    if (!std::filesystem::exists(folder_)) GTEST_SKIP() << "no " << folder_;
+    if (!std::filesystem::exists(folder_)) GTEST_SKIP() << folder_ << " does not exist";
   }
-  /// Returns the RMS before and after the adjustment, px.
+  /// Returns the RMS before and after the adjustment, in px.
   std::pair<double, double> Rms(const std::string& name, const BundleOptions& options = {}) {
     BundleFile file = ReadBundle(folder_ / name);
     BundleProblem& problem = file.problem;

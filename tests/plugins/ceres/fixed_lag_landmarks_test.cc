@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of the fixed-lag smoother with landmarks. It is compared with the Kalman filter on a linear
-// map, and with the batch. It differs from the batch by the linearisation of data that have left
-// the window.
+// Tests the fixed-lag smoother with landmarks. Compares it with the Kalman filter on a linear map,
+// and with the batch. The smoother differs from the batch by the linearisation of data that have
+// left the window.
 #include "batch_landmarks_fixture.h"
 
 namespace alidade {
@@ -88,7 +88,7 @@ struct LinearMap {
     for (int k = 0; k < steps; ++k, r += vector(0.1 * std::sqrt(0.1))) {
       std::vector<Observation> observations;
       for (int i = 0; i < kPoints; ++i) {
-        const int phase = (k + 5 * i) % 17;  // absent for 10 frames, so the filter removes it
+        const int phase = (k + 5 * i) % 17;  // the point is absent for 10 frames
         if (phase >= 7 || (phase == 2 && i % 3 == 0) || k % 9 == 4) continue;
         const Vector3d z = points[static_cast<std::size_t>(i)] - r + vector(kNoise);
         observations.push_back({i, {z[0], z[1], z[2]}});
@@ -118,15 +118,15 @@ TEST(FixedLagLandmarks, OfALinearMapIsTheKalmanFilterWhateverTheWindow) {
   }
 }
 
-/// Appends a late frame without measurements. All earlier frames leave the window before this
-/// frame.
+/// Appends a late frame without measurements. All earlier frames leave the window before the late
+/// frame is processed.
 std::vector<Frame> WithLateFrame(std::vector<Frame> frames) {
   frames.push_back(FrameOf(100.0, {}));
   return frames;
 }
 
-/// Expects that the smoother equals the batch. Data leave the window only after the solution of all
-/// data, at which they are linearised. Therefore no information is lost.
+/// Expects that the smoother equals the batch. All data are linearised at the solution of all data
+/// before they leave the window, so no information is lost.
 void ExpectNothingIsLost(const Problem& problem, const std::vector<Frame>& frames) {
   const std::vector<Frame> all = WithLateFrame(frames);
   const auto batch = MakeBatch(problem, "solver: sparse\n");
@@ -169,7 +169,7 @@ TEST(FixedLagLandmarks, WhatLeavesHasTheWeightOfTheSolution) {
 }
 
 /// Returns the mean distance, over all frames, between the newest estimate of `filter` and that of
-/// the filtering batch. It is in sigmas of the batch.
+/// the filtering batch. The distance is in sigmas of the batch.
 double MeanDistance(Estimator& filter, const MapProblem& map, const std::vector<State>& batch) {
   double sum = 0.0;
   for (std::size_t k = 0; k < map.frames.size(); ++k) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of the fixed-lag smoother. It is compared with the batch, with the Kalman filter, and with
-// its own estimates before frames leave the window.
+// Tests the fixed-lag smoother. Compares it with the batch, with the Kalman filter, and with its
+// own estimates before frames leave the window.
 #include <cmath>
 
 #include "alidade/experiment/run.h"
@@ -23,8 +23,8 @@ struct Estimate {
   Eigen::MatrixXd p;
 };
 
-/// Returns the estimate of all blocks that have a value, in the order of the layout. Unused places
-/// of the state are omitted.
+/// Returns the estimate of all blocks that have a value, in the order of the layout. Unused rows of
+/// the state are omitted.
 Estimate EstimateOf(const State& state) {
   Estimate estimate;
   std::vector<int> rows;
@@ -61,8 +61,8 @@ std::vector<Estimate> SmoothOver(Estimator& estimator, const std::vector<Frame>&
 
 // ---- linear -------------------------------------------------------------------------------------
 
-/// Returns the problem of a point with process noise of rank 1. One sensor measures its position
-/// and another its velocity.
+/// Returns the problem of a point with process noise of rank 1. One sensor measures the position of
+/// the point, and another sensor measures the velocity.
 Problem LinearSystem() {
   Problem problem = testing::LinearSystem();
   AddSensor(problem, "rate", testing::LinearSensor(1.5, 0.8), {"p.v"});
@@ -115,7 +115,7 @@ TEST(FixedLag, OfALinearProblemIsTheKalmanFilterWhateverTheWindow) {
   const std::vector<Frame> frames = LinearFrames(60);
   ExpectTheKalmanFilter(LinearSystem(), frames);
   ExpectTheKalmanFilter(LinearSystem(), frames,
-                        "lag_s: 0.04\n");  // less than a period
+                        "lag_s: 0.04\n");  // the window is shorter than the time between two frames
   ExpectTheKalmanFilter(LinearSystem(), frames, "lag_s: 0.7\n");
   std::vector<Frame> gap = LinearFrames(10);  // the whole window leaves at once
   gap.push_back(FrameAt(4.0, {{0, 1.2}}));
@@ -153,7 +153,7 @@ TEST(FixedLag, WhatIsKnownStays) {
   ExpectTheKalmanFilter(problem, LinearFrames(40));
 }
 
-// The first frames contain no measurement of p.x. A later frame initialises it.
+// The first frames contain no measurement of p.x. A later frame initialises p.x.
 TEST(FixedLag, ABlockMayStartFromAMeasurement) {
   Problem problem = LinearSystem();
   problem.priors[0].sensor = "z";
@@ -179,8 +179,8 @@ TEST(FixedLag, ABlockMayStartFromAMeasurement) {
 
 // ---- nonlinear ----------------------------------------------------------------------------------
 
-/// Returns frames of a target at the depth 0.3 + 0.1 sin(2.5 t) m. Most frames contain its
-/// disparity (BF = 26 px m), and all contain 1 / scale.
+/// Returns frames of a target at the depth 0.3 + 0.1 sin(2.5 t) m. Most frames contain the
+/// disparity of the target (BF = 26 px m), and all frames contain 1 / scale.
 std::vector<Frame> DepthFrames(int count) {
   std::vector<Frame> frames;
   for (int k = 0; k < count; ++k) {
@@ -288,7 +288,7 @@ RunResult RunDepth(const std::string& estimators,
   return Run(experiment, {});
 }
 
-/// Returns the mean of a metric over all runs, for each estimator in their order.
+/// Returns the mean of a metric over all runs, in the order of the estimators.
 std::vector<double> Means(const std::vector<RunResult>& runs, const std::string& metric) {
   std::vector<double> means;
   for (const RunResult& run : runs) {
@@ -330,8 +330,8 @@ TEST(FixedLag, LiesBetweenTheFilterAndTheBatchAndIsHonest) {
   for (const double share : Means(runs, "nees.within95:target")) EXPECT_GT(share, 0.97);
 }
 
-// The smoother has no gate, but its stereo sensor rejects distances below 0.3 m, which is half of
-// the measurements.
+// The smoother has no gate, but its stereo sensor rejects distances below 0.3 m. Half of the
+// measurements have such distances.
 TEST(FixedLag, LendsWhatItAccepted) {
   const RunResult run = RunDepth(
       "{one: {type: fixed_lag, lag_s: 0.3, overrides: {sensors: {stereo: {min_range_m: 0.3}}}}, "
@@ -352,7 +352,7 @@ TEST(FixedLag, IsRefusedWhatItCannotDo) {
                                  const std::string& value, const std::string& what) {
     try {
       RunDepth("{one: {type: fixed_lag" + options + "}}", {{key, value}});
-      ADD_FAILURE() << "took " << key << ": " << value;
+      ADD_FAILURE() << "accepted " << key << ": " << value;
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ExitCode::kBadConfig);
       EXPECT_NE(std::string(error.what()).find(what), std::string::npos) << error.what();

@@ -44,7 +44,7 @@ Apart LargestOf(const Problem& problem, const std::vector<Frame>& frames,
   for (const LandmarkEstimate& expected : whole->landmarks()) {
     const LandmarkEstimate* const landmark = testing::Find(map, expected.id);
     if (landmark == nullptr) {
-      ADD_FAILURE() << "no landmark " << expected.id;
+      ADD_FAILURE() << "the map does not contain landmark " << expected.id;
       continue;
     }
     const double sigma = std::sqrt(expected.covariance.trace());
@@ -91,7 +91,8 @@ TEST(IncrementalBatch, IsNearWhereItIsLinearisedNear) {
 }
 
 // Without relinearisation, a landmark moves with the camera of its first observation. For a linear
-// map this is exact, except for changes that are too small to be propagated to earlier frames.
+// map this motion is exact, except for changes that are too small to be propagated to earlier
+// frames.
 TEST(IncrementalBatch, OfALinearMapTheLandmarksFollowTheirCameras) {
   Random random(3);
   std::vector<Frame> frames;
@@ -110,8 +111,8 @@ TEST(IncrementalBatch, OfALinearMapTheLandmarksFollowTheirCameras) {
   EXPECT_EQ(apart.whole, 0);
 }
 
-// Landmarks that were not seen for a while leave the last matrix. They return to it when they are
-// seen again.
+// Landmarks that were not seen for a while leave the last matrix. These landmarks return to the
+// matrix when they are seen again.
 TEST(IncrementalBatch, TakesLandmarksBackThatWereGone) {
   MapProblem map(45, 9);
   for (std::size_t k = 12; k < map.frames.size(); ++k) {
@@ -124,7 +125,7 @@ TEST(IncrementalBatch, TakesLandmarksBackThatWereGone) {
   EXPECT_LT(apart.state, 1e-7);
   EXPECT_LT(apart.covariance, 1e-6);
   EXPECT_EQ(apart.whole, 0);
-  // The part of the matrix to which they return is eliminated again.
+  // The part of the matrix to which the landmarks return is eliminated again.
   EXPECT_LT(LargestOf(map, "0.3").state, 0.5);
 }
 
@@ -174,7 +175,7 @@ TEST(IncrementalBatch, TellsWhatIsMeasuredOfALandmarkThatIsKnown) {
   }
 }
 
-// The variance of an exactly known value is zero, and is not a rounding error.
+// The variance of an exactly known value is exactly zero, not a rounding error.
 TEST(IncrementalBatch, OfWhatIsKnownExactlyThereIsNoVariance) {
   Problem problem = testing::DepthFilter();
   for (Prior& prior : problem.priors) {
@@ -216,7 +217,7 @@ TEST(IncrementalBatch, OfAVaguePriorIsSolvedAsAWhole) {
       "time lose digits; so are all frames from here on");
 }
 
-// A stopped batch has no map. It does not return the map of its filter.
+// A stopped batch has no map, and it does not return the map of its filter.
 TEST(CeresBatchEnds, AStoppedBatchHasNoMap) {
   const MapProblem map(6, 8);
   for (const char* solver : {"sparse", "dense"}) {

@@ -47,7 +47,8 @@ std::vector<double> ResidualAt(const ceres::CostFunction& cost, const Values& va
   return r;
 }
 
-/// Residual and Jacobians of a cost. Their buffers contained other numbers before the evaluation.
+/// Residual and Jacobians of a cost. Before the evaluation, the buffers contain other numbers,
+/// which must be overwritten.
 struct Evaluated {
   std::vector<double> r;
   Values j;
@@ -97,8 +98,8 @@ void ExpectTrueJacobians(const ceres::CostFunction& cost, const Values& values,
 
 GeometryManifold Of(const Geometry& geometry) { return GeometryManifold({{geometry, false}}); }
 
-// With d = 20 / 2 = 10 px, z = 13 px and sigma = 2 px:  r = -1.5,  dr/dZ = -10 / 2 / 2 = -2.5 per
-// m.
+// With d = 20 / 2 = 10 px, z = 13 px and sigma = 2 px, r = -1.5 and
+// dr/dZ = -10 / 2 / 2 = -2.5 per m.
 TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   const StereoDisparity model(200.0, 0.1, 2.0);
   const SharedSensor by_abi = MakeSensor(model, "stereo_disparity");
@@ -120,8 +121,8 @@ TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   }
 }
 
-/// Pose and intrinsics are in one block, and not in the order of the roles. The noise is
-/// correlated.
+/// One block contains the pose and the intrinsics, in an order that differs from that of the roles.
+/// The noise is correlated.
 TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
   const SelfCalibratingFeature<RadialLens> model(1.0);
   const SharedSensor by_abi = MakeSensor(model, "self_calibrating_feature");

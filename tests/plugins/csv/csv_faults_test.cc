@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of tables and configs with a fault. The comment above a test contains the number of the
-// fault.
+// Tests tables and configs with a fault. The comment above a test contains the number of the fault.
 #include <algorithm>
 
 #include "csv_fixture.h"
@@ -11,30 +10,30 @@ namespace {
 
 // ---- bad data -----------------------------------------------------------------------------------
 
-// Fault 27 of tests/faults/README.md.
+// Tests fault 27 of tests/faults/README.md.
 TEST_F(Csv, WrongNumberOfColumns) {
   ExpectBadData(std::string("# c\n") + kHeader + "0,1,2,3\n1,2,3\n",
                 "FILE:4:6: 3 columns; expected 4 columns, as in line 2");
   ExpectBadData(std::string(kHeader) + "0,1,2,3,4\n",
-                "FILE:2:9: 5 columns; expected 4 columns, as in line 1");
+                "FILE:2:9: the line has 5 columns; expected 4 columns, as in line 1");
 }
 
 TEST_F(Csv, BytesThatAreNoText) {
   const std::string expected =
-      "FILE:1:1: not a text file; expected a table; for a compressed one use a pipe: zcat FILE | "
-      "alidade run CONFIG --set source.path=-";
+      "FILE:1:1: this is not a text file; expected a table as text; to read a compressed table, "
+      "use a pipe: zcat FILE | alidade run CONFIG --set source.path=-";
   ExpectBadData("\x1F\x8B\x08\x01,t_s\n", expected);
   ExpectBadData(std::string("t\0_\0s\0\n", 7), expected);
 }
 
-// Fault 34 of tests/faults/README.md.
+// Tests fault 34 of tests/faults/README.md.
 TEST_F(Csv, TruncatedLastLine) {
   ExpectBadData(
       std::string(kHeader) + "0,1,2,3\n1,2",
-      "FILE:3:4: the last line is cut short: 2 columns; expected 4 columns, as in line 1");
+      "FILE:3:4: the last line is cut short: it has 2 columns; expected 4 columns, as in line 1");
 }
 
-// Fault 28 of tests/faults/README.md.
+// Tests fault 28 of tests/faults/README.md.
 TEST_F(Csv, NotANumber) {
   const auto expect = [&](const std::string& cell) {
     ExpectBadData(
@@ -54,7 +53,7 @@ TEST_F(Csv, ShowsHostileCellsHarmlessly) {
                 "FILE:2:3 disparity_px: '?' is not a number; expected a finite number");
 }
 
-// Fault 29 of tests/faults/README.md.
+// Tests fault 29 of tests/faults/README.md.
 TEST_F(Csv, NotFinite) {
   for (const std::string cell : {"nan", "inf", "-inf", "NaN", "Infinity"}) {
     ExpectBadData(std::string(kHeader) + "0,1," + cell + ",3\n",
@@ -66,7 +65,7 @@ TEST_F(Csv, NotFinite) {
                 "FILE:2:1 t_s: 'nan' is not finite; expected a finite number");
 }
 
-// Fault 30 of tests/faults/README.md.
+// Tests fault 30 of tests/faults/README.md.
 TEST_F(Csv, Overflow) {
   for (const std::string cell : {"1e400", "-1e400", "1e-400"}) {
     ExpectBadData(std::string(kHeader) + "0,1,2," + cell + "\n",
@@ -80,23 +79,24 @@ TEST_F(Csv, ReciprocalOfZero) {
                 "FILE:2:5 scale: '0' has no finite reciprocal; expected a finite number");
 }
 
-// Fault 33 of tests/faults/README.md.
+// Tests fault 33 of tests/faults/README.md.
 TEST_F(Csv, LineTooLong) {
-  // A row has three cells and a long number. 4096 bytes are accepted, one more is an error. The
-  // line end does not count.
+  // A row has three cells and a long number. A row of 4096 bytes is accepted, and a longer row is
+  // an error. The line end does not count.
   const auto row = [](std::size_t length) { return "0,1,2,3." + std::string(length - 8, '0'); };
   for (const std::string end : {"", "\n", "\r\n"}) {
     EXPECT_EQ(Frames(kHeader + row(4096) + end, kDepthConfig).size(), 1u);
     ExpectBadData(kHeader + row(4097) + end,
-                  "FILE:2:1: line too long; expected at most 4096 bytes per line");
+                  "FILE:2:1: the line is too long; expected at most 4096 bytes per line");
   }
   ExpectBadData(kHeader + row(200000),
-                "FILE:2:1: line too long; expected at most 4096 bytes per line");
+                "FILE:2:1: the line is too long; expected at most 4096 bytes per line");
 }
 
 TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
-  // The buffer of 65536 bytes ends between the '\r' and the '\n' of a line of 4096 bytes. The line
-  // counts as one, so the next line has the correct number.
+  // The buffer of 65536 bytes ends between the '\r' and the '
+  // ' of a line of 4096 bytes. The two characters count as one line end, so the next line has the
+  // correct number.
   std::string text = kHeader;
   while (text.size() + 4097 + 4000 < 65536) text += '#' + std::string(3998, ' ') + '\n';
   text += '#' + std::string(65536 - 4097 - 2 - text.size(), ' ') + '\n';
@@ -106,7 +106,7 @@ TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
                           ":1 t_s: 'x' is not a number; expected a finite number");
 }
 
-// Faults 35 and 36 of tests/faults/README.md.
+// Tests faults 35 and 36 of tests/faults/README.md.
 TEST_F(Csv, TimeMustIncrease) {
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n# c\n0.1,1,2,3\n",
                 "FILE:5:1 t_s: '0.1' is earlier than in line 3; expected increasing times, or "
@@ -126,11 +126,12 @@ TEST_F(Csv, TimeBeyondTheTimestamps) {
                 "FILE:2:1 t_s: '' is not a number; expected a finite number");
 }
 
-// Fault 43 of tests/faults/README.md.
+// Tests fault 43 of tests/faults/README.md.
 TEST_F(Csv, NothingAtAll) {
-  ExpectBadData("", "FILE: no header line; expected a line that names the columns");
-  ExpectBadData("# c\n\n", "FILE: no header line; expected a line that names the columns");
-  ExpectBadData(kHeader, "FILE: no data rows; expected a row below the header");
+  ExpectBadData("", "FILE: the header line is missing; expected a line that names the columns");
+  ExpectBadData("# c\n\n",
+                "FILE: the header line is missing; expected a line that names the columns");
+  ExpectBadData(kHeader, "FILE: the table has no rows; expected a row below the header");
 }
 
 // ---- bad config ---------------------------------------------------------------------------------
@@ -138,18 +139,19 @@ TEST_F(Csv, NothingAtAll) {
 TEST_F(Csv, UnknownColumn) {
   Write(std::string(kHeader) + "0,1,2,3\n");
   ExpectBadConfig("path: a.csv\nstreams: {d: [disparity_pc]}\n",
-                  "run.yaml:2:15 streams.d[0]: no column 'disparity_pc' in FILE; expected one of "
-                  "t_s, disparity_px, scale, reference_depth_m; did you mean 'disparity_px'?");
+                  "run.yaml:2:15 streams.d[0]: there is no column 'disparity_pc' in FILE; expected "
+                  "one of t_s, disparity_px, scale, reference_depth_m; did you mean "
+                  "'disparity_px'?");
   ExpectBadConfig("path: a.csv\nstreams: {d: scale}\ntime: {column: timestamp}\n",
-                  "run.yaml:3:16 time.column: no column 'timestamp' in FILE; expected one of t_s, "
-                  "disparity_px, scale, reference_depth_m");
+                  "run.yaml:3:16 time.column: there is no column 'timestamp' in FILE; expected one "
+                  "of t_s, disparity_px, scale, reference_depth_m");
 }
 
 TEST_F(Csv, AnotherSeparatorIsNamed) {
   const auto expect = [&](const std::string& separator, const std::string& words) {
     Write("t_s" + separator + "z\n0" + separator + "1\n");
     ExpectBadConfig("path: a.csv\nstreams: {z: z}\n",
-                    "run.yaml:1:1: no column 't_s' in FILE; expected one of t_s" + words);
+                    "run.yaml:1:1: there is no column 't_s' in FILE; expected one of t_s" + words);
   };
   expect(";", ";z, or 'source.separator: \";\"'");
   expect("\t", "?z, or 'source.separator: \"\\t\"'");
@@ -160,22 +162,23 @@ TEST_F(Csv, AnotherSeparatorIsNamed) {
 TEST_F(Csv, MissingIsTheTextOfACell) {
   Write("t_s,z\n0,1\n");
   ExpectBadConfig("path: a.csv\nmissing: .nan\nstreams: {z: z}\n",
-                  "run.yaml:2:10 missing: '.nan' is not the text of a cell; expected the text as "
-                  "it is in the table; did you mean 'nan'?");
+                  "run.yaml:2:10 missing: '.nan' cannot be the text of a cell; expected the text "
+                  "that the table contains; did you mean 'nan'?");
 }
 
 TEST_F(Csv, ShowsHostileColumnNamesHarmlessly) {
   Write("t_s,disp\x1b[31marity," + std::string(50, 'y') + "\n0,1,2\n");
   ExpectBadConfig("path: a.csv\nstreams: {d: 'disp[31marity'}\n",
-                  "run.yaml:2:14 streams.d: no column 'disp[31marity' in FILE; expected one of "
-                  "t_s, disp?[31marity, " +
+                  "run.yaml:2:14 streams.d: there is no column 'disp[31marity' in FILE; expected "
+                  "one of t_s, disp?[31marity, " +
                       std::string(40, 'y') + "...; did you mean 'disp?[31marity'?");
 }
 
 TEST_F(Csv, ColumnNamedTwice) {
   Write("t_s,z,z\n0,1,2\n");
   ExpectBadConfig("path: a.csv\nstreams: {z: z}\n",
-                  "run.yaml:2:14 streams.z: FILE has two columns 'z'; expected one");
+                  "run.yaml:2:14 streams.z: FILE has two columns 'z'; expected one column with "
+                  "this name");
 }
 
 TEST_F(Csv, UnknownAndMissingKeys) {
@@ -185,7 +188,7 @@ TEST_F(Csv, UnknownAndMissingKeys) {
   ExpectBadConfig("path: a.csv\nstreams: {d: scale}\nblind_afer: 0.5\n",
                   "run.yaml:3:1 blind_afer: unknown key; did you mean 'blind_after'?");
   ExpectBadConfig("path: a.csv\nstreams: {}\n",
-                  "run.yaml:2:10 streams: no streams; expected a map, such as 'disparity: "
+                  "run.yaml:2:10 streams: the map is empty; expected a map such as 'disparity: "
                   "disparity_px'");
   ExpectBadConfig("streams: {d: scale}\n", "run.yaml:1:1 path: missing key, needed by csv");
 }
@@ -193,14 +196,14 @@ TEST_F(Csv, UnknownAndMissingKeys) {
 TEST_F(Csv, GainOfNothing) {
   Write("t_s,z\n0,1\n");
   ExpectBadConfig("path: a.csv\nstreams: {z: {columns: z, gain: 0}}\n",
-                  "run.yaml:2:33 streams.z.gain: a gain of 0 erases the column; expected a number "
-                  "other than 0");
+                  "run.yaml:2:33 streams.z.gain: a gain of 0 sets all values to 0; expected a "
+                  "number other than 0");
 }
 
 TEST_F(Csv, TimeAndRateExcludeEachOther) {
   ExpectBadConfig("path: a.csv\ntime: {column: t_s}\nrate_hz: 30\nstreams: {d: scale}\n",
-                  "run.yaml:3:10 rate_hz: 'time' and 'rate_hz' are both given; expected one of "
-                  "them");
+                  "run.yaml:3:10 rate_hz: 'time' and 'rate_hz' are both given; expected only "
+                  "one of these keys");
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of tables from files, from pipes and from standard input.
+// Tests tables from files, from pipes and from standard input.
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/stat.h>
@@ -72,7 +72,7 @@ TEST_F(Csv, ASignalEndsTheWaitForAPipe) {
 TEST_F(Csv, RefusesWhatCannotBeRead) {
   const auto expect = [&](const std::string& reason) {
     ExpectError(ExitCode::kInputMissing,
-                "run.yaml:1:7 path: 'FILE': " + reason + "; expected a readable file",
+                "run.yaml:1:7 path: cannot read 'FILE': " + reason + "; expected a readable file",
                 [&] { Open(); });
   };
   expect("No such file or directory");
@@ -91,7 +91,7 @@ TEST_F(Csv, NoticesAFileThatChangesWhileItIsRead) {
   SourceFrame frame;
   EXPECT_TRUE(source->Next(frame));
   std::ofstream(File(), std::ios::app) << "1,2\n";
-  ExpectError(ExitCode::kIo, "FILE:3: changed while it was read", [&] {
+  ExpectError(ExitCode::kIo, "FILE:3: the file changed while it was read", [&] {
     while (source->Next(frame)) {
     }
   });

@@ -52,8 +52,8 @@ TEST_F(Csv, GainAndReciprocalScaleTheColumn) {
   EXPECT_DOUBLE_EQ(frames[0].measurements[1].values[0], 0.75);
 }
 
-// The known numbers of a range are the position of the satellite. If one of them is missing, there
-// is no measurement.
+// The known numbers of a range are the position of the satellite. If one of these numbers is
+// missing, the frame has no measurement of the range.
 TEST_F(Csv, ReadsKnownNumbersWithAMeasurement) {
   const std::string config =
       "path: a.csv\nstreams: {range: {columns: r, gain: 1e3, known: [x, y]}, other: r}\n";
@@ -71,8 +71,8 @@ TEST_F(Csv, ReadsKnownNumbersWithAMeasurement) {
   EXPECT_TRUE(frames[1].measurements[0].known.empty());
 }
 
-// The table has a row for each satellite: two at the first time and one at the second. The true
-// value is that of the first row that contains one.
+// The table has one row per satellite: two rows at the first time and one row at the second time.
+// The true value is that of the first row that contains a true value.
 TEST_F(Csv, RowsOfOneTimeAreOneFrameWhereTimesRepeat) {
   const std::string config =
       "path: a.csv\ntime: {column: t_s, repeats: true}\n"
@@ -140,8 +140,8 @@ TEST_F(Csv, SeparatesAsTold) {
   Write("t_s\tz\tw\n0\t\t5\n");
   EXPECT_EQ(Held(Frames("path: a.csv\nseparator: \"\\t\"\nstreams: {z: z, w: w}\n")[0]), "1 |");
   ExpectBadConfig("path: a.csv\nseparator: \"1\"\nstreams: {z: z}\n",
-                  "run.yaml:2:12 separator: not a separator; expected one character that does not "
-                  "occur in numbers, such as ';' or \"\\t\"");
+                  "run.yaml:2:12 separator: this text is not a valid separator; expected one "
+                  "character that does not occur in numbers, such as ';' or \"\\t\"");
 }
 
 TEST_F(Csv, EmptyCellIsMissing) {
@@ -213,7 +213,7 @@ TEST_F(Csv, RateStandsInForTime) {
 
 TEST_F(Csv, NumbersDoNotDependOnTheLocale) {
   const CommaLocale comma;
-  if (!comma.active()) GTEST_SKIP() << "localedef is not installed";
+  if (!comma.active()) GTEST_SKIP() << "localedef is not available";
   EXPECT_EQ(Frames("t_s,z\n0.5,1.25\n", "path: a.csv\nstreams: {z: z}\n")[0].measurements[0].values,
             std::vector<double>{1.25});
 }
@@ -247,12 +247,12 @@ TEST_F(Csv, BlindAfterDropsTheFirstStreamInTheRestOfTheSeries) {
       const std::string held = Held(frame);
       EXPECT_TRUE(held == "0 1 | 0" || held == "1 | 0") << held;
       ended |= held == "1 | 0";
-      EXPECT_EQ(held == "1 | 0", ended);  // after the first blind row all rows are blind
+      EXPECT_EQ(held == "1 | 0", ended);  // all rows after the first blind row are blind
       count += ended ? 0 : 1;
     }
     return count;
   };
-  // Row k = 0 .. 6 is not blind if k < 7 F, with the fraction F.
+  // Row k = 0 .. 6 is not blind if k < 7 F. F is the given fraction.
   EXPECT_EQ(seen("0"), 0);
   EXPECT_EQ(seen("0.1"), 1);
   EXPECT_EQ(seen("0.5"), 4);
@@ -277,20 +277,20 @@ TEST_F(Csv, BlindNamesTheStreams) {
   EXPECT_EQ(Held(Frames(config + "blind: inverse_scale\n")[1]), "0 | 0");
   EXPECT_EQ(Held(Frames(config + "blind: [inverse_scale, disparity]\n")[1]), "| 0");
   ExpectBadConfig(config + "blind: [disparty]\n",
-                  "run.yaml:5:9 blind[0]: no stream 'disparty'; expected one of disparity, "
-                  "inverse_scale; did you mean 'disparity'?");
+                  "run.yaml:5:9 blind[0]: there is no stream 'disparty'; expected one of "
+                  "disparity, inverse_scale; did you mean 'disparity'?");
   ExpectBadConfig(kDepthConfig + std::string("blind: disparity\n"),
-                  "run.yaml:4:8 blind: has no effect without 'blind_after'; expected "
-                  "'blind_after' as well");
+                  "run.yaml:4:8 blind: this key has no effect without 'blind_after'; expected "
+                  "the key 'blind_after', too");
 }
 
 TEST_F(Csv, BlindAfterNeedsRowsInTheOrderOfTime) {
   Write(std::string(kHeader) + "1,1,2,3\n0,1,2,3\n");
   any_order_ = true;
   ExpectBadConfig(kDepthConfig + std::string("blind_after: 0.5\n"),
-                  "run.yaml:4:14 blind_after: counts the rows in the order of the file, but "
+                  "run.yaml:4:14 blind_after: this key counts rows in the order of the file, but "
                   "'out_of_sequence.policy' reorders them; expected 'out_of_sequence.policy: "
-                  "reject', for a file in the order of time");
+                  "reject', which requires a file in the order of time");
   EXPECT_EQ(Frames(kDepthConfig + std::string("blind_after: 1\n")).size(), 2u);
 }
 

@@ -19,8 +19,8 @@ constexpr double kBfPxM = 400.0 * 0.065;
 
 using Values = std::map<std::string, double>;
 
-/// Host that provides a source with parameters: those in `values`, and defaults for the others. The
-/// value of a choice is its index.
+/// Host that provides the parameters of a source: those in `values`, and defaults for the others.
+/// The value of a choice is its index.
 class Host {
  public:
   explicit Host(Values values = {}) : values_(std::move(values)) {
@@ -110,7 +110,7 @@ double MeanProduct(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 TEST(DepthTarget, DefaultsAreTheScenarioOf2017) {
-  // The times are t = 0, 33 ms, ... <= 5 s. The last one is 151 * 33 ms = 4.983 s.
+  // The times are t = 0, 33 ms, ... <= 5 s. The last time is 151 * 33 ms = 4.983 s.
   const std::vector<SourceFrame> frames = AllFrames({});
   ASSERT_EQ(frames.size(), 152u);
   EXPECT_EQ(Host().Make()->size(), 152);
@@ -221,8 +221,8 @@ TEST(DepthTarget, NearZeroIsNeverBlind) {
 }
 
 TEST(DepthTarget, NoiseIsAsItsFormulasSay) {
-  // Both recovered noises are N(0, 1) at every depth. In either half of the depths they have mean 0
-  // and variance 1, and are not correlated. Tolerances are 5 sigma of n samples.
+  // Both recovered noises are N(0, 1) at every depth. In each half of the depths, the noises have
+  // mean 0 and variance 1, and are not correlated. Tolerances are 5 sigma of n samples.
   const std::vector<SourceFrame> frames = AllFrames({{"rate_hz", 10000.0},
                                                      {"duration_s", 5.0},
                                                      {"sigma_disparity_px", 0.5},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of control inputs from a config. All estimators run tests/plugins/driven/config.yaml on one
+// Tests control inputs from a config. All estimators run tests/plugins/driven/config.yaml on one
 // table.
 #include <algorithm>
 #include <cmath>
@@ -24,9 +24,9 @@ struct Gaussian {
   double x, p;
 };
 
-/// Returns the estimates of the Kalman filter or of the smoother for drive.csv, calculated here.
-/// There is no speed before 0.5 s. Each speed acts until the next one. Only the speed of 2.5 s ends
-/// earlier, at 4 s, because its timeout is 1.5 s.
+/// Returns the estimates of the Kalman filter or of the smoother for drive.csv, computed here.
+/// There is no speed before 0.5 s. Each speed acts until the next speed arrives. Only the speed of
+/// 2.5 s ends earlier, at 4 s, because its timeout is 1.5 s.
 std::vector<Gaussian> WrittenOut(bool smoothed) {
   struct Row {
     double t_s, distance, fix;  // distance since the previous row, m; fix, m, or 0
@@ -145,8 +145,8 @@ TEST_F(DrivenTest, AStreamThatTheLenderMeasuresIsNoInputOfTheFollower) {
                     "{ekf: {type: ekf}, same: {type: ekf, use: {accepted_by: ekf}, overrides: "
                     "{state: {car: {input: {stream: gps}}}}}}"),
             "--set estimators.same.use.accepted_by: stream 'gps' is the control input of 'car' and "
-            "the stream of sensor 'gps' of 'ekf', so rejected measurements would be missing as "
-            "inputs; expected a filter without a sensor on that stream");
+            "also the stream of sensor 'gps' of 'ekf', so measurements that 'ekf' rejects would be "
+            "missing as inputs; expected a filter without a sensor on that stream");
 }
 
 // The stream of a control input must not belong to a sensor of any filter in the chain of
@@ -163,7 +163,7 @@ TEST_F(DrivenTest, NorIsAStreamThatAnyLenderOnTheWayMeasures) {
   std::string text;
   EXPECT_EQ(testing::CodeOf([&] { BuildExperiment(config, host_); }, &text), 78);
   EXPECT_NE(text.find("estimators.c.use.accepted_by: stream 'gps' is the control input of 'car' "
-                      "and the stream of sensor 'gps' of 'a'"),
+                      "and also the stream of sensor 'gps' of 'a'"),
             std::string::npos)
       << text;
 }
@@ -186,7 +186,7 @@ TEST_F(DrivenTest, ASensorOfTheNameOfAnEntryIsStillToldUnused) {
 }
 
 TEST_F(DrivenTest, FramesThatComeLateGiveTheBytesOfThoseInOrder) {
-  // The batch with mode: filtering cannot process late frames.
+  // The batch with `mode: filtering` cannot process late frames.
   const std::string estimators =
       "{ekf: {type: ekf}, iekf: {type: iekf}, root: {type: square_root_ekf}, ukf: {type: ukf}, "
       "rts: {type: rts}, batch: {type: ceres_batch}}";
@@ -220,14 +220,14 @@ TEST_F(DrivenTest, WhatIsNotAnInputIsRefusedWithItsPlace) {
             "gps, odometry; did you mean 'odometry'?");
   EXPECT_EQ(
       Refusal("source.streams.odometry", "[speed_m_s, gps_m]"),
-      ":4:40 state.car.input.stream: stream 'odometry' has 2 values at a time; expected 1, as "
-      "control input 'speed' of model 'driven'");
+      ":4:40 state.car.input.stream: stream 'odometry' has 2 values per measurement; expected 1, "
+      "the size of the control input 'speed' of model 'driven'");
   EXPECT_EQ(Refusal("state.car", "{model: driven, noise: {speed: 0.2}, initial: {}}"),
             "--set state.car.input: missing key, needed by the control input speed of model "
             "driven");
   EXPECT_EQ(Refusal("state.car.input", "odometry"),
-            "--set state.car.input: not a map; expected {stream: NAME}, or {stream: NAME, "
-            "timeout_s: S}");
+            "--set state.car.input: the value is not a map; expected {stream: NAME}, or "
+            "{stream: NAME, timeout_s: S}");
   EXPECT_EQ(Refusal("state.car.input", "{timeout_s: 1}"),
             "--set state.car.input.stream: missing key, needed by the control input speed of "
             "model driven");
@@ -239,8 +239,8 @@ TEST_F(DrivenTest, WhatIsNotAnInputIsRefusedWithItsPlace) {
   EXPECT_EQ(Refusal("state.car.inputs", "{odom: odometry}"),
             "--set state.car.inputs: unknown key; did you mean 'input'?");
   EXPECT_EQ(Refusal("state.other", "{model: constant, input: {stream: odometry}, initial: {}}"),
-            "--set state.other.input: model 'constant' has no control input; expected the key "
-            "left out");
+            "--set state.other.input: model 'constant' has no control input; remove this "
+            "key");
   EXPECT_EQ(Refusal("estimators.ekf.overrides", "{state: {car: {input: {stream: gsp}}}}"),
             "--set estimators.ekf.overrides.state.car.input.stream: the source has no stream "
             "'gsp'; expected one of gps, odometry; did you mean 'gps'?");

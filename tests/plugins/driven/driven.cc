@@ -10,7 +10,8 @@ struct Fix : alidade::Sensor<alidade::Vec<1>, alidade::Vec<1>> {
   static constexpr std::array kRoles{alidade::Quantity{"position", "m"}};
   static constexpr alidade::Quantity kMeasurement{"fix", "m"};
   double sigma_m;
-  explicit Fix(alidade::Params& p) : sigma_m(p.Positive("sigma_m", "m", "of a fix")) {}
+  explicit Fix(alidade::Params& p)
+      : sigma_m(p.Positive("sigma_m", "m", "noise of a fix, 1 sigma")) {}
   template <class T>
   bool Predict(const T* position, T* fix) const {
     fix[0] = position[0];
@@ -24,5 +25,6 @@ struct Fix : alidade::Sensor<alidade::Vec<1>, alidade::Vec<1>> {
 
 }  // namespace
 
-ALIDADE_PLUGIN(ALIDADE_MOTION(alidade::testing::Driven, "driven", "driven by its velocity", ""),
-               ALIDADE_SENSOR(Fix, "fix", "the position itself", ""))
+ALIDADE_PLUGIN(ALIDADE_MOTION(alidade::testing::Driven, "driven", "position with a given speed",
+                              ""),
+               ALIDADE_SENSOR(Fix, "fix", "measured position", ""))

@@ -14,8 +14,8 @@
 #include "support/systems.h"
 
 /// Tests of a shipped model, which one struct defines. The model runs as a plugin in the engine and
-/// in the batch, and composed at compile time. A composition takes seconds to compile, so the rows
-/// are divided among several sources.
+/// in the batch, and as a part of a filter composed at compile time. Such a filter takes seconds to
+/// compile, so the rows are divided among several sources.
 namespace alidade::testing {
 
 /// Motion model of a block that the tested sensor uses.
@@ -28,7 +28,7 @@ using Seen = ManifoldSensor<G, 0.05>;
 using Means = std::vector<std::vector<double>>;
 
 /// Adds the state entry `name`. The priors of its blocks have the means `means`, and a sigma of
-/// 0.05 for each element. The stream of its control input is `NAME.input`.
+/// 0.05 for each element. The stream of the control input is `NAME.input`.
 inline void AddMotion(Problem& problem, const std::string& name, const SharedMotion& model,
                       const Means& means) {
   MotionBinding binding{name, model, {}};
@@ -236,7 +236,7 @@ inline const std::string kSmallCameraText = "camera: {" + kSmallCameraKeys + '}'
 inline const Camera kSmallCamera(32, 24, 20, 20, 16, 12);
 inline const std::vector<double> kPosition{0.1, -0.1, 0.2}, kOrientation{1, 0, 0, 0};
 
-/// Returns the plugins of this build.
+/// Returns the folder of the plugins of this build.
 inline const std::filesystem::path& ShippedFolder() {
   static const std::filesystem::path folder =
       std::filesystem::path(ALIDADE_BINARY_DIR) / "lib/alidade/plugins";
@@ -247,8 +247,8 @@ inline const PluginHost& Shipped() {
   return host;
 }
 
-/// Test of one row. The tests are in every_model_test.cc, the rows in the other *_test.cc of this
-/// folder.
+/// Test of one row. The tests are in every_model_test.cc, and the rows are in the other *_test.cc
+/// of this folder.
 class EveryModel : public ::testing::TestWithParam<Row> {
  protected:
   const Row& row_ = GetParam();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of every shipped model: as a plugin in the engine and in the batch, composed at compile
-// time, and with the checker. A shipped model without a row is an error.
+// Tests every shipped model: as a plugin in the engine and in the batch, in a filter composed at
+// compile time, and with the checker. A shipped model without a row is an error.
 #include "alidade/check/check.h"
 #include "alidade/experiment/estimator_plugin.h"
 #include "every_model_fixture.h"
@@ -19,7 +19,7 @@ TEST_P(EveryModel, GivesTheBatchItsFactors) {
   const auto& entries = Shipped().entries();
   if (std::none_of(entries.begin(), entries.end(),
                    [](const PluginEntry& entry) { return entry.name == "ceres_batch"; })) {
-    GTEST_SKIP() << "built without the Ceres solver";
+    GTEST_SKIP() << "this build does not contain the Ceres solver";
   }
   const Config config = Config::FromText("type: ceres_batch", "batch.yaml");
   const std::unique_ptr<Estimator> batch =

@@ -10,7 +10,7 @@
 
 namespace alidade {
 
-/// One of the plugins in tests/plugins/golden/1.0, by the stem of its file.
+/// Test with one of the plugins in tests/plugins/golden/1.0. The parameter is the stem of its file.
 class GoldenTest : public HostTest, public ::testing::WithParamInterface<const char*> {
  protected:
   static std::filesystem::path Kept() {
@@ -18,10 +18,10 @@ class GoldenTest : public HostTest, public ::testing::WithParamInterface<const c
   }
   void SetUp() override {
 #if !defined(__x86_64__)
-    GTEST_SKIP() << "the plugins are for x86-64";
+    GTEST_SKIP() << "the plugins are built for x86-64";
 #endif
   }
-  /// A copy that nobody else can write to, whatever the mode of the files in the source tree.
+  /// Returns a copy that no other user can write to. The mode of the original file is not relevant.
   std::filesystem::path Lent() {
     namespace fs = std::filesystem;
     const fs::path file = folder_ / "golden.so";
@@ -44,7 +44,7 @@ class GoldenTest : public HostTest, public ::testing::WithParamInterface<const c
   std::unique_ptr<PluginHost> host_;
 };
 
-/// Those that there are.
+/// File stems of all plugins in tests/plugins/golden/1.0.
 inline constexpr const char* kGolden[] = {"gxx", "clangxx", "c99"};
 
 }  // namespace alidade

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Plugins that were built with plugin ABI 1.0, against the formulas in tests/plugins/golden/1.0.
-// This file is compiled a second time into a host of a later minor version (grown_test.cc).
+// Compares plugins that were built with plugin ABI 1.0 with the formulas in
+// tests/plugins/golden/1.0. This file is also compiled into a host of a later minor version
+// (grown_host.cc).
 #include <array>
 #include <cmath>
 
@@ -34,7 +35,7 @@ TEST_P(GoldenModels, LineIsItsClosedForm) {
   const double short_one = 20.0, long_one = 20.5;
   EXPECT_EQ(line->Valid({&short_one, &k}), Status::kOk);
   EXPECT_EQ(line->Valid({&long_one, &k}), Status::kInvalid);
-  // Out of its domain nothing is written.
+  // Outside its domain, the sensor writes no output.
   const double there = 4.0;
   const double* nowhere[] = {&there, &b};
   double untouched = 7.0;
@@ -62,7 +63,7 @@ TEST_P(GoldenModels, LineInverts) {
 }
 
 TEST_P(GoldenModels, ParametersOfEveryKindAreRead) {
-  // All defaults: to the right, height 2 m, any length.
+  // All parameters have their defaults: the side is right, the height is 2 m, any length is valid.
   const SharedSensor line = Sensor("golden_line", "{gain: 1, sigma_m: 0.1, noise_model: relative}");
   const double x = 3.0, b = 0.0, k = 1.0, far = 1e6;
   const double* roles[] = {&x, &b};
@@ -92,8 +93,8 @@ TEST_P(GoldenModels, FixIsItsClosedForm) {
   const double p[] = {1.0, -2.0}, h = 3.0;
   const double* roles[] = {p, &h};
   std::array<double, 3> z{};
-  std::array<double, 12> by_p;  // four to a row
-  std::array<double, 6> by_h;   // two to a row
+  std::array<double, 12> by_p;  // 4 elements per row
+  std::array<double, 6> by_h;   // 2 elements per row
   by_p.fill(9.0);
   by_h.fill(9.0);
   double* jacobians[] = {by_p.data(), by_h.data()};
@@ -116,7 +117,8 @@ TEST_P(GoldenModels, FixIsItsClosedForm) {
 
 TEST_P(GoldenModels, DirectionIsItsClosedForm) {
   const SharedSensor direction = Sensor("golden_direction", "{field: [3, 0, -4], sigma_rad: 0.2}");
-  // Turns about x, to below the equator and above it: both signs of the basis.
+  // After the two rotations about x, the direction is below and above the equator. The basis has a
+  // different sign in the two cases.
   for (const double angle : {0.8, -2.5}) {
     const double q[] = {std::cos(0.5 * angle), std::sin(0.5 * angle), 0.0, 0.0};
     const double* roles[] = {q};
@@ -129,7 +131,7 @@ TEST_P(GoldenModels, DirectionIsItsClosedForm) {
     EXPECT_NEAR(z[0], 0.6, kTight);
     EXPECT_NEAR(z[1], -0.8 * s, kTight);
     EXPECT_NEAR(z[2], -0.8 * c, kTight);
-    // B(z)' (z x), with the basis that plugin_abi.h states.
+    // The expected Jacobian is B(z)' (z x), with the basis that plugin_abi.h defines.
     const double sign = z[2] < 0.0 ? -1.0 : 1.0, a = -1.0 / (sign + z[2]);
     const double basis[3][2] = {{1.0 + sign * z[0] * z[0] * a, z[0] * z[1] * a},
                                 {sign * z[0] * z[1] * a, sign + z[1] * z[1] * a},
@@ -172,7 +174,7 @@ TEST_P(GoldenModels, CartIsItsClosedForm) {
   const double by_rates[] = {
       chord / v * c, k * (slope * c - si * s), chord / v * s, k * (slope * s + si * c), 0.0, dt};
   for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(g[i], by_rates[i], kTight) << i;
-  // B = d x'/d u, which this host never asks for, with the whole call at the plugin's own table.
+  // B = dx'/du. This host never requests B, so the test calls the function of the plugin directly.
   const AlidadeInstance& c_abi = dynamic_cast<const PluginMotion&>(*cart).instance().c();
   const double* inputs[] = {u};
   ASSERT_EQ(c_abi.motion->step(c_abi.self, blocks, inputs, w, dt, next, nullptr, 0, nullptr, 0,

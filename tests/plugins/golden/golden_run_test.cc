@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Plugins that were built with plugin ABI 1.0, in the program of today. Where the engine is meant
-// to give other estimates, ALIDADE_REPLAY_WRITE=1 writes 1.0/estimates.csv anew.
+// Runs plugins that were built with plugin ABI 1.0 in the current program. If a change of the
+// engine is meant to change estimates, ALIDADE_REPLAY_WRITE=1 rewrites 1.0/estimates.csv.
 #include <cmath>
 #include <cstdlib>
 #include <map>
@@ -27,7 +27,8 @@ TEST_P(GoldenRun, IsTheFileThatWasKept) {
   std::map<std::string, std::string> kept;
   for (std::string sum, name; sums >> sum >> name;) kept[name] = sum;
   const std::string name = std::string(GetParam()) + ".so";
-  EXPECT_EQ(internal::Sha256OfFile(Kept() / name), kept[name]) << "never rebuild, only add";
+  EXPECT_EQ(internal::Sha256OfFile(Kept() / name), kept[name])
+      << "never rebuild a plugin of this folder; only add new ones";
   EXPECT_EQ(ReadBuildTag(Lent()).abi_minor, 0);
 }
 
@@ -82,7 +83,7 @@ TEST_P(GoldenRun, GivesTheEstimatesOfItsDay) {
     const auto a = testing::Cells(now[row]), b = testing::Cells(then[row]);
     ASSERT_EQ(a.size(), b.size());
     for (std::size_t i = 0; i < a.size(); ++i) {
-      // Other libraries of mathematics round otherwise, and a filter carries that on.
+      // Other mathematical libraries round differently, and a filter propagates the difference.
       EXPECT_NEAR(std::stod(a[i]), std::stod(b[i]), 1e-7) << now[row];
     }
   }

@@ -3,10 +3,11 @@
 #
 # grow.sh HEADER OUTPUT
 #
-# From plugin_abi.h that of a later minor version, which has used all the room that its rules leave:
-# structs that plugins make have more members at their end, all structs have taken a reserved member
-# (`taken`), and there are a kind of entry, hints and bits to be understood that HEADER does not know.
-# Fails if a struct was not found, so that it follows the header.
+# Derives the plugin_abi.h of a later minor version from HEADER. The later version uses every
+# extension that the rules of the ABI permit. Structs that plugins create have more members at their
+# end. All structs use a reserved member (`taken`). There are a kind of entry, hints and required
+# bits that HEADER does not define. Fails if a struct is not found, so this script must be changed
+# together with the header.
 set -eu
 awk '
   BEGIN {
@@ -44,7 +45,7 @@ awk '
   }
   END {
     for (one in grows) if (!(one in grew)) missing = missing " " one
-    # AlidadeSpace has one reserved member alone.
+    # AlidadeSpace has only one reserved member.
     for (one in wanted) if (!(one in took) && one != "AlidadeSpace") missing = missing " " one
     if (!minor) missing = missing " ALIDADE_ABI_MINOR"
     if (!kind) missing = missing " ALIDADE_KIND_SENSOR"

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A plugin of a later minor version, against the header that grow.sh makes: all structs larger than
- * those of 1.0, with something in the members that 1.0 does not have, and hints set. The models
- * behind the first use one thing each that has to be understood. NEEDS_MINOR is that of its tag. */
+/* A plugin of a later minor version, compiled with the header that grow.sh derives. All structs are
+ * larger than those of 1.0. The members that 1.0 does not have are set, and hints are set too. Each
+ * model except the first uses one feature that a host must support. NEEDS_MINOR is the minor
+ * version in the build tag. */
 #include <stdlib.h>
 #include <string.h>
 

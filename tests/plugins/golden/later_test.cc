@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A plugin of a later minor version, later.c, in this host: what it need not understand it does
-// without, all else it refuses by name.
+// Loads a plugin of a later minor version, later.c, in this host. The host ignores the features
+// that it need not support. It refuses and names all other features.
 #include "alidade/check/check.h"
 #include "alidade/plugin/plugin_sections.h"
 #include "plugins/host/host_fixture.h"
@@ -63,7 +63,7 @@ TEST_F(LaterPlugin, WhatHasToBeUnderstoodIsRefusedByName) {
     ExpectError(ExitCode::kPlugin, {std::string("model '") + name + "'", words},
                 [&] { host.CreateSensor(name, Parse("{}").root()); });
   }
-  // A code that this version does not know is a failure of the call.
+  // A status code that this version does not define is a failure of the call.
   const SharedSensor sensor = host.CreateSensor("later_code", Parse("{}").root());
   const double x = 3.0, b = 0.5;
   const double* roles[] = {&x, &b};

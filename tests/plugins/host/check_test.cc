@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every model of tests/faults/plugins/bad_models.cc has one fault. The corresponding check must
-// report the fault, and no other check may fail.
+// Tests the models of tests/faults/plugins/bad_models.cc, each of which has at most one fault. The
+// corresponding check must report the fault, and no other check may fail.
 #include "alidade/check/check.h"
 
 #include <algorithm>
@@ -42,7 +42,7 @@ class CheckTest : public HostTest {
 };
 
 struct Fault {
-  int number;  ///< number in tests/faults/README.md; 0: none
+  int number;  ///< number in tests/faults/README.md; 0: the fault has no number
   const char* model;
   const char* check;
   std::vector<const char*> words;
@@ -55,7 +55,8 @@ std::string Name(const ::testing::TestParamInfo<Fault>& info) {
 class OneFault : public CheckTest, public ::testing::WithParamInterface<Fault> {};
 
 TEST_P(OneFault, IsFoundByItsCheckAlone) {
-  // In a sanitizer build the sanitizer ends such a process, and the stack is different.
+  // In a sanitizer build the sanitizer ends these processes, and the layout of the stack is
+  // different.
   const std::string model = GetParam().model;
   const bool differs = model == "exits" || model == "eats_memory" || model == "unwritten";
   if (testing::kSanitized && differs) GTEST_SKIP() << "a sanitizer ends the process differently";
@@ -74,54 +75,54 @@ TEST_P(OneFault, IsFoundByItsCheckAlone) {
 INSTANTIATE_TEST_SUITE_P(
     Models, OneFault,
     ::testing::Values(
-        Fault{58, "throws_in_create", "create", {"failed while being created: the dog ate it"}},
+        Fault{58, "throws_in_create", "create", {"could not be created: the dog ate it"}},
         Fault{66, "crashes_in_create", "create", {"create crashed (signal 11"}},
         Fault{66, "wild_description", "create", {"create crashed (signal 11"}},
         Fault{58, "throws_in_noise", "calls", {"SqrtNoise at x = ", "failed: the dog ate it"}},
-        Fault{58, "throws_in_destroy", "create", {"Destroy of model", "threw: never let go"}},
+        Fault{58,
+              "throws_in_destroy",
+              "create",
+              {"function destroy of model", "threw: never let go"}},
         Fault{59, "throws_int", "calls", {"Predict at", "an exception of unknown type"}},
         Fault{60, "unwritten", "outputs", {"Predict at", "z.second is not written"}},
         Fault{60, "nan_output", "outputs", {"Predict at x = 0, y = ", "z.second is nan"}},
-        Fault{60, "nan_noise", "noise", {"SqrtNoise at", "entry (0, 0) is nan"}},
-        Fault{60, "infinite_q", "noise", {"SqrtQ at", "dt = ", "entry (0, 0) is -inf"}},
+        Fault{60, "nan_noise", "noise", {"SqrtNoise at", "(0, 0) of the noise factor is nan"}},
+        Fault{60, "infinite_q", "noise", {"SqrtQ at", "dt = ", "the noise factor is -inf"}},
         Fault{61, "past_the_end", "bounds", {"Predict at", "writes outside the buffer of z"}},
         Fault{61, "writes_its_input", "bounds", {"Predict at", "writes to the input y"}},
         Fault{61, "ignores_strides", "bounds", {"writes outside the buffer of Jacobian 0"}},
-        Fault{62, "wrong_jacobian", "jacobian", {"Predict: d z.second / d x is", "by differences"}},
+        Fault{62, "wrong_jacobian", "jacobian", {"Predict: d z.second / d x is", "from numeric"}},
         Fault{63,
               "two_values",
               "same_value",
-              {"with all Jacobians differs from the value with no Jacobian: z = (", " apart"}},
+              {"all Jacobians differs from the value with no Jacobian: z = (", ", difference "}},
         Fault{64,
               "not_deterministic",
               "deterministic",
               {"Predict at", "two consecutive calls return different results"}},
         Fault{65, "hidden_state", "pure", {"Predict at", "the result depends on earlier calls"}},
-        Fault{66, "crashes", "calls", {"Predict crashed (signal 11", "; at x = "}},
-        Fault{66, "exits", "calls", {"Predict ended the process with exit code 0; at x = "}},
-        Fault{
-            66, "exits_at_once", "calls", {"Predict ended the process with exit code 0; at x = "}},
-        Fault{67, "stops_itself", "calls", {"than 1 s (--timeout); it ended in Predict at x = "}},
-        Fault{67, "hangs_in_create", "create", {"than 1 s (--timeout); it ended in create"}},
-        Fault{67, "hangs_in_destroy", "create", {"than 1 s (--timeout); it ended in destroy"}},
+        Fault{66, "crashes", "calls", {"Predict crashed (signal 11", ") at x = "}},
+        Fault{66, "exits", "calls", {"Predict ended the process with exit code 0 at x = "}},
+        Fault{66, "exits_at_once", "calls", {"Predict ended the process with exit code 0 at x = "}},
+        Fault{67, "stops_itself", "calls", {"1 s (--timeout); it was stopped in Predict at x = "}},
+        Fault{67, "hangs_in_create", "create", {"than 1 s (--timeout); it was stopped in create"}},
+        Fault{67, "hangs_in_destroy", "create", {"1 s (--timeout); it was stopped in destroy"}},
         Fault{67,
               "hangs_in_noise",
               "calls",
-              {"the check took longer than 1 s (--timeout); it ended in SqrtNoise at x = "}},
+              {"the check took longer than 1 s (--timeout); it was stopped in SqrtNoise at x = "}},
         Fault{67,
               "hangs",
               "calls",
-              {"the check took longer than 1 s (--timeout); it ended in Predict at x = "}},
+              {"the check took longer than 1 s (--timeout); it was stopped in Predict at x = "}},
         Fault{68, "leaks", "leaks", {"Predict leaks 10", "bytes per call"}},
         Fault{68, "loses_itself", "leaks", {"create and destroy leaks", "bytes per call"}},
         Fault{68, "leaks_files", "leaks", {"Predict leaves files open"}},
         Fault{69, "rounds_upward", "environment", {"Predict changed the rounding mode"}},
         Fault{69, "sets_locale", "environment", {"Predict changed the locale from 'C'"}},
         Fault{0, "prints", "environment", {"the model prints text", "output of a run: 'hello'"}},
-        Fault{0,
-              "eats_memory",
-              "calls",
-              {"Predict at", "std::bad_alloc; the limit of memory is 64 MB"}},
+        Fault{
+            0, "eats_memory", "calls", {"Predict at", "std::bad_alloc; the memory limit is 64 MB"}},
         Fault{0, "singular_noise", "noise", {"R is singular: the smallest eigenvalue"}},
         Fault{0, "no_noise", "noise", {"R is singular: the noise is 0 for z.second"}},
         Fault{0, "writes_and_fails", "failure", {"Predict at", "fails, but writes an output"}},
@@ -193,7 +194,7 @@ TEST_F(CheckTest, NamesADestroyThatHangsAfterParametersAreRefused) {
       CheckModel(FindModels(host_, Built("bad_models").string(), "hangs_in_destroy").at(0),
                  config.root(), options);
   EXPECT_EQ(Joined(Failures(findings)),
-            "create: the check took longer than 1 s (--timeout); it ended in destroy\n");
+            "create: the check took longer than 1 s (--timeout); it was stopped in destroy\n");
 }
 
 TEST_F(CheckTest, ADiscretisationPassesWhereItsOrderIsGiven) {
@@ -212,7 +213,8 @@ TEST_F(CheckTest, NamesTheWorstEntryOfAWrongJacobian) {
   const std::string words = std::find_if(findings.begin(), findings.end(), is)->text;
   double written = 0.0, numeric = 0.0, x = 0.0, y = 0.0;
   ASSERT_EQ(std::sscanf(words.c_str(),
-                        "Predict: d z.second / d x is %lf from the model, %lf by differences; "
+                        "Predict: d z.second / d x is %lf from the model, but %lf from "
+                        "numeric differences; "
                         "Predict at x = %lf, y = %lf",
                         &written, &numeric, &x, &y),
             4)
@@ -259,12 +261,13 @@ TEST_F(CheckTest, FindsPluginsByFileStemAndModel) {
   EXPECT_EQ(FindModels(host_, "bad_models").size(), FindModels(host_, Built("bad_models")).size());
   EXPECT_EQ(FindModels(host_, "scale_2d").at(0).name, "scale_2d");
   EXPECT_EQ(FindModels(host_, "gravity").size(), 1u);
-  ExpectError(ExitCode::kPlugin, {"no plugin 'scale_2' with", "did you mean 'scale_2d'?"},
+  ExpectError(ExitCode::kPlugin,
+              {"no sensor or motion model was found for 'scale_2'; did you mean 'scale_2d'?"},
               [&] { FindModels(host_, "scale_2"); });
   // The name is similar to that of a source, which is not a model.
-  ExpectError(ExitCode::kPlugin, {"no plugin 'depth_targe' with a sensor or motion model\n"},
+  ExpectError(ExitCode::kPlugin, {"no sensor or motion model was found for 'depth_targe'\n"},
               [&] { FindModels(host_, "depth_targe"); });
-  ExpectError(ExitCode::kPlugin, {"offers no model 'righ'", "did you mean 'right'?"},
+  ExpectError(ExitCode::kPlugin, {"does not contain a model 'righ'", "did you mean 'right'?"},
               [&] { FindModels(host_, "bad_models", "righ"); });
 }
 
@@ -290,8 +293,8 @@ void AddLandmarkSensors(std::multimap<std::string, std::string>& parameters) {
   }
 }
 
-// At 1e6 rad/s the camera rotates many times in a step. With these seeds, numeric differences over
-// long steps agree on a mean slope.
+// At 1e6 rad/s the camera rotates many times within a step. With these seeds, numeric differences
+// over long steps agree on a mean slope.
 TEST_F(CheckTest, AMotionThatTurnsManyTimesInAStepPasses) {
   const PluginEntry odometry = FindModels(host_, "odometry_pose").at(0);
   const Config config = Parse("{noise: {linear_velocity: 0.3, angular_velocity: 0.002}}");
@@ -344,7 +347,7 @@ TEST_F(CheckTest, ShippedModelsPass) {
     if (!entry.is_model() || entry.plugin.parent_path() != std::filesystem::canonical(shipped))
       continue;
     const auto [first, last] = parameters.equal_range(entry.name);
-    EXPECT_NE(first, last) << "no parameters here for " << entry.name;
+    EXPECT_NE(first, last) << "this test has no parameters for " << entry.name;
     for (auto row = first; row != last; ++row, ++checked) {
       const Config config = Parse(row->second);
       EXPECT_EQ(Joined(Failures(CheckModel(entry, config.root()))), "")

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Test in which several threads create models of one host.
+// Tests that several threads can create models of one host.
 #include <thread>
 
 #include "host_fixture.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of noise given as a covariance: `covariance` of a sensor, and `noise.covariance` of a state
+// Tests noise given as a covariance: `covariance` of a sensor, and `noise.covariance` of a state
 // entry.
 #include <cmath>
 
@@ -59,7 +59,7 @@ Problem PixelsWith(const std::string& keys) {
   return ReadProblem(config.root(), ShippedModels(), {});
 }
 
-// The root of [1 0.6; 0.6 4] = L L' is L = [1 0; 0.6 sqrt(4 - 0.36)], px.
+// The root of [1 0.6; 0.6 4] = L L' is L = [1 0; 0.6 sqrt(4 - 0.36)], in px.
 TEST_F(GivenNoise, IsThatOfEveryModelOfTheSensor) {
   const Values expected = {1.0, 0.0, 0.6, std::sqrt(4.0 - 0.6 * 0.6)};
   const Problem problem = PixelsWith("covariance: [[1, 0.6], [0.6, 4]]");
@@ -115,7 +115,7 @@ TEST_F(GivenNoise, OfAMotionModelIsThatOfItsInputs) {
   const Config config =
       Parse("{dimensions: 2, noise: {kind: discrete, covariance: [[4, -1], [-1, 1]]}}");
   const SharedMotion model = Motion(config, "constant_velocity");
-  // The noise is a held acceleration, m/s^2. Its root therefore does not depend on dt.
+  // The noise is a held acceleration, in m/s^2. Its root therefore does not depend on dt.
   for (const double dt_s : {0.1, 3.0}) {
     EXPECT_EQ(RootOfQ(model, dt_s), (Values{2.0, 0.0, -0.5, std::sqrt(0.75)}));
   }

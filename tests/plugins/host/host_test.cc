@@ -60,7 +60,8 @@ TEST_F(HostTest, RunsASensorOfOneFileBuiltByABareCommandLine) {
 }
 
 TEST_F(HostTest, StructsOfOneNameInTwoPluginsStayApart) {
-  // Both plugins define `struct Probe` with default visibility. Both are open at the same time.
+  // Both plugins define `struct Probe` with default visibility, and both plugins are open at the
+  // same time.
   const PluginHost two({Built("twin_two")}), three({Built("twin_three")});
   const Config config = Parse("model: probe");
   EXPECT_EQ(Predicted(two.CreateSensor("probe", config.root()), 1.0), 2.0);
@@ -78,7 +79,8 @@ TEST_F(HostTest, FindsPluginsOfTheEnvironmentAndTheUser) {
   EXPECT_NO_THROW(host.CreateSensor("range_rate", config.root()));
   ASSERT_GE(host.searched().size(), 4u);
   EXPECT_EQ(host.searched()[0], "/nowhere (ALIDADE_PLUGIN_PATH): does not exist");
-  EXPECT_EQ(host.searched()[1], (folder_ / "path").string() + " (ALIDADE_PLUGIN_PATH): 1 found");
+  EXPECT_EQ(host.searched()[1],
+            (folder_ / "path").string() + " (ALIDADE_PLUGIN_PATH): 1 entry found");
 }
 
 TEST_F(HostTest, LeavesPluginsClosedOfWhichNoNameIsAskedFor) {
@@ -130,7 +132,8 @@ TEST_F(HostTest, AMissingModelNamesPlaceSuggestionAndSearch) {
   const Node entry = config.root().At("sensors").At("s");
   ExpectError(ExitCode::kPlugin,
               {"test.yaml:2:14 sensors.s.model", "no plugin offers the sensor 'prob'",
-               "did you mean 'probe'?", "searched " + Built("good").string() + " (given): 1 found",
+               "did you mean 'probe'?",
+               "searched " + Built("good").string() + " (config or command line): 1 entry found",
                "no_user_data/alidade/plugins (user data folder): does not exist"},
               [&] { host.CreateSensor("prob", entry); });
   ExpectError(ExitCode::kPlugin, {"no plugin offers the motion model 'probe'", "there is a sensor"},
@@ -180,8 +183,8 @@ TEST_F(HostTest, ATruncatedPluginIsRefused) {
 TEST_F(HostTest, APluginForAnotherKindOfProcessorIsRefused) {
   const fs::path file = Copy("good", "good.so");
   std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
-  stream.seekp(18);  // e_machine
-  stream.put(2);     // SPARC
+  stream.seekp(18);  // the field e_machine of the ELF header
+  stream.put(2);     // the value for SPARC
   stream.close();
   ExpectRefused(file, {"has no alidade build tag", "is for another kind of processor"});
 }
@@ -192,7 +195,7 @@ TEST_F(HostTest, AFileWithoutBuildTagIsRefused) {
   ExpectRefused(Built("no_build_tag"), {"has no alidade build tag"});
 }
 
-// Fault 53 of tests/faults/README.md.
+// Tests fault 53 of tests/faults/README.md.
 TEST_F(HostTest, AnotherAbiIsRefused) {
   ExpectRefused(Built("other_abi"),
                 {"built for plugin ABI 99.0", "this program has 1.0", "rebuild the plugin"});
@@ -216,7 +219,7 @@ TEST_F(HostTest, ACppPluginOfAnotherAbiNumberIsRefusedWithBothNumbers) {
       {"a C++ plugin for ABI number 'other', but this program has '" ALIDADE_CPP_ABI "'"});
 }
 
-// Fault 55 of tests/faults/README.md.
+// Tests fault 55 of tests/faults/README.md.
 TEST_F(HostTest, AMissingSymbolIsNamedAtLoad) {
   ExpectRefused(Built("undefined_symbol"), {"cannot be loaded", "a_function_nobody_defines"});
 }
@@ -226,7 +229,7 @@ TEST_F(HostTest, ABadTableIsRefused) {
       {"MAGIC", "wrong magic number"},
       {"STRUCT_SIZE", "table states a size of 8 bytes"},
       {"STRIDE", "entry stride of 3 bytes"},
-      {"NULL_NAME", "entry 1 of its table has no name"},
+      {"NULL_NAME", "entry 1 of its table has no valid name"},
       {"NULL_TABLE", "its table is null"},
       {"NO_CREATE", "entry 1 of its table has no create function"},
       {"NAME_TWICE", "names 'probe' twice"},

@@ -6,7 +6,7 @@
 
 #include "alidade/model/plugin.h"
 
-/// Source that is built with every compiler and set of flags of the build matrix. It uses
+/// A plugin that is built with every compiler and set of flags of the build matrix. It uses
 /// transcendental functions, quaternions, fixed and heap-allocated Eigen matrices, and the standard
 /// library.
 namespace {
@@ -49,7 +49,7 @@ struct MatrixSensor : alidade::Sensor<Vec<2>, UnitQuaternion, Vec<3>, Vec<1>> {
   }
 };
 
-/// Motion q' = q Exp(omega dt), omega' = omega e^(-dt / tau) + w.
+/// Motion model q' = q Exp(omega dt), omega' = omega e^(-dt / tau) + w.
 struct MatrixMotion : alidade::Motion<3, UnitQuaternion, Vec<3>> {
   static constexpr std::array kBlocks{Quantity{"orientation"},
                                       Quantity{"rate", "rad/s", "", "x,y,z"}};

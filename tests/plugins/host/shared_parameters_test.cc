@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of parameters that sensors and the source share: the maps `camera` and `landmarks` at the
+// Tests parameters that sensors and the source share: the maps `camera` and `landmarks` at the
 // root.
 #include "alidade/experiment/source_plugin.h"
 #include "alidade/testing/jacobians.h"
@@ -65,13 +65,14 @@ TEST_F(SharedParametersTest, ErrorsNameTheMapThatIsWrong) {
     });
   };
   const std::string sensors = "sensors: {pixels: {sigma_px: 1}}\n";
-  // If a key is missing in both maps, the error names the map at the root, which is the usual one.
+  // If a key is missing in both maps, the error names the map at the root, because this map is the
+  // usual place.
   refused({"test.yaml:2:1 camera.fy: missing; model 'inverse_depth_feature' needs it (px, > 0"},
           sensors + "camera: {width: 640, height: 480, fx: 500, cx: 320, cy: 240}");
   refused({"camera.width: missing; model 'inverse_depth_feature' needs it"}, sensors);
   refused({"test.yaml:2:45 camera.fx: '-5'", "> 0"},
           sensors + "camera: {width: 640, height: 480,       fx: -5, fy: 5, cx: 1, cy: 1}");
-  // The key is unknown, or is one of another lens.
+  // The key is unknown, or it belongs to another lens.
   refused({"test.yaml:2:81 camera.fz: unknown key", "did you mean 'fx'?"},
           sensors + kCamera.substr(0, kCamera.size() - 2) + ",           fz: 3}");
   refused({"camera.k1: unknown key"}, sensors + kCamera.substr(0, kCamera.size() - 2) + ", k1: 3}");

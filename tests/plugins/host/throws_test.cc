@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Fault 58 of tests/faults/README.md: plugins written against the C header throw, which the header
-// forbids.
+// Tests fault 58 of tests/faults/README.md: plugins written against the C header throw, which the
+// header forbids.
 #include "alidade/io/log.h"
 #include "alidade/plugin/create.h"
 #include "host_fixture.h"
@@ -33,7 +33,7 @@ TEST_F(ThrowsTest, InCreateIsAnErrorOfThePlugin) {
   const std::string plugin = Built("raw_throws").string();
   ExpectError(ExitCode::kPlugin,
               {"model 'throws_in_create' of plugin " + plugin,
-               "failed while being created: it threw: the dog ate it"},
+               "could not be created: it threw an exception: the dog ate it"},
               [&] { Sensor("throws_in_create"); });
   ExpectError(ExitCode::kPlugin, {"model 'throws_int_in_create'", "an exception of unknown type"},
               [&] { Sensor("throws_int_in_create"); });
@@ -64,7 +64,8 @@ TEST_F(ThrowsTest, InACallIsAFailureOfThatCall) {
   const SharedMotion q = Motion("throws_in_sqrt_q");
   EXPECT_EQ(q->SqrtQ(roles_, nullptr, 0.1, &out_), Status::kError);
   EXPECT_EQ(q->error_text(), Words("SqrtQ", "throws_in_sqrt_q"));
-  EXPECT_NE(eval->error_text(), Words("SqrtQ", "throws_in_sqrt_q")) << "another model threw it";
+  EXPECT_NE(eval->error_text(), Words("SqrtQ", "throws_in_sqrt_q"))
+      << "the exception came from another model";
 }
 
 TEST_F(ThrowsTest, WhatWasThrownIsOfTheLastFailureAlone) {

@@ -18,8 +18,8 @@ namespace fs = std::filesystem;
 constexpr uid_t kStranger = 54321;
 constexpr std::size_t npos = std::string::npos;
 
-/// Test that a plugin that another user could have written is not opened.
-/// Fault 70 of tests/faults/README.md.
+/// Tests that the host does not open a plugin that another user could have written. This is fault
+/// 70 of tests/faults/README.md.
 class TrustTest : public HostTest {
  protected:
   static void Allow(const fs::path& path, fs::perms who) {
@@ -34,14 +34,14 @@ TEST_F(TrustTest, AFileThatOthersCanWrite) {
   const fs::path file = Copy("good", "good.so");
   EXPECT_NO_THROW(CheckTrusted(file));
   Allow(file, fs::perms::others_write);
-  ExpectNotTrusted(file, "it is writable for everyone");
+  ExpectNotTrusted(file, "it is writable by everyone");
 }
 
 TEST_F(TrustTest, AFileThatAGroupCanWrite) {
-  if (geteuid() != 0) GTEST_SKIP() << "only root can give files to another group";
+  if (geteuid() != 0) GTEST_SKIP() << "only root can change the group of a file";
   // The user www-data has a private group, as users of Ubuntu do.
   const passwd* const user = getpwnam("www-data");
-  if (user == nullptr) GTEST_SKIP() << "no such user";
+  if (user == nullptr) GTEST_SKIP() << "the user www-data does not exist";
   const uid_t id = user->pw_uid;
   const gid_t own = user->pw_gid;
   const fs::path file = Copy("good", "a/good.so");
@@ -62,21 +62,21 @@ TEST_F(TrustTest, AFileThatAGroupCanWrite) {
     return error;
   };
   EXPECT_EQ(trusted(own, own), "") << "a private group may write, as with `umask 002`";
-  EXPECT_NE(trusted(own, kStranger).find("it is writable for its group; chmod go-w"), npos);
-  EXPECT_NE(trusted(kStranger, own).find("' is writable for its group"), npos);
-  EXPECT_NE(trusted(own, 0).find("it is writable for its group"), npos)
+  EXPECT_NE(trusted(own, kStranger).find("it is writable by its group; run 'chmod go-w"), npos);
+  EXPECT_NE(trusted(kStranger, own).find("' is writable by its group"), npos);
+  EXPECT_NE(trusted(own, 0).find("it is writable by its group"), npos)
       << "the group of root is not private";
 }
 
 TEST_F(TrustTest, AFolderThatOthersCanWrite) {
   const fs::path file = Copy("good", "a/b/good.so");
   Allow(folder_ / "a", fs::perms::others_write);
-  ExpectNotTrusted(file, "'" + (folder_ / "a").string() + "' is writable for everyone");
+  ExpectNotTrusted(file, "'" + (folder_ / "a").string() + "' is writable by everyone");
   Allow(folder_ / "a", fs::perms::sticky_bit);
   EXPECT_NO_THROW(CheckTrusted(file))
       << "as in /tmp, other users cannot replace files in this folder";
   Allow(folder_ / "a/b", fs::perms::others_write | fs::perms::sticky_bit);
-  ExpectNotTrusted(file, "'" + (folder_ / "a/b").string() + "' is writable for everyone");
+  ExpectNotTrusted(file, "'" + (folder_ / "a/b").string() + "' is writable by everyone");
 }
 
 TEST_F(TrustTest, ARelativePath) {
@@ -91,8 +91,8 @@ TEST_F(TrustTest, ALinkToWhatOthersCanWrite) {
   EXPECT_NO_THROW(CheckTrusted(folder_ / "link.so"));
   EXPECT_NO_THROW(CheckTrusted(folder_ / "link_to_folder/good.so"));
   Allow(folder_ / "open", fs::perms::others_write);
-  ExpectNotTrusted(folder_ / "link.so", "writable for everyone");
-  ExpectNotTrusted(folder_ / "link_to_folder/good.so", "writable for everyone");
+  ExpectNotTrusted(folder_ / "link.so", "writable by everyone");
+  ExpectNotTrusted(folder_ / "link_to_folder/good.so", "writable by everyone");
 }
 
 TEST_F(TrustTest, AFolderThatIsLeftAgainCounts) {
@@ -100,7 +100,7 @@ TEST_F(TrustTest, AFolderThatIsLeftAgainCounts) {
   fs::create_directory(folder_ / "open");
   Allow(folder_ / "open", fs::perms::others_write);
   fs::create_directory(folder_ / "open/deeper");
-  ExpectNotTrusted(folder_ / "open/deeper/../../good.so", "writable for everyone");
+  ExpectNotTrusted(folder_ / "open/deeper/../../good.so", "writable by everyone");
 }
 
 TEST_F(TrustTest, EndlessLinks) {
@@ -112,7 +112,7 @@ TEST_F(TrustTest, EndlessLinks) {
 }
 
 TEST_F(TrustTest, AForeignOwner) {
-  if (geteuid() != 0) GTEST_SKIP() << "only root can give files away";
+  if (geteuid() != 0) GTEST_SKIP() << "only root can change the owner of a file";
   const fs::path file = Copy("good", "a/good.so");
   ASSERT_EQ(chown(file.c_str(), kStranger, 0), 0);
   ExpectNotTrusted(file, "owned by user 54321, not by root, you or the owner of this program");
@@ -134,7 +134,7 @@ TEST_F(TrustTest, InADefaultPlaceItIsToldWhenItsModelIsMissed) {
   EXPECT_EQ(host.refusals()[0].code, ExitCode::kNotTrusted);
   EXPECT_EQ(host.refusals()[0].file, file);
   const Config config = Parse("model: probe");
-  ExpectError(ExitCode::kNotTrusted, {file.string(), "not trusted", "writable for everyone"},
+  ExpectError(ExitCode::kNotTrusted, {file.string(), "not trusted", "writable by everyone"},
               [&] { host.CreateSensor("probe", config.root()); });
   const Config stereo = Parse("{model: s, focal_px: 1, baseline_m: 1, sigma_px: 1}");
   EXPECT_NO_THROW(host.CreateSensor("stereo_disparity", stereo.root()));

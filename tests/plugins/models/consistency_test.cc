@@ -3,7 +3,7 @@
 // Runs every shipped model and every test model with `source: {type: models}`, in the problems of
 // tests/plugins/models/consistent. Each problem is linear, or linear to the accuracy that its
 // comment states. The estimator `ekf` has the true models, so its NEES and NIS are chi-square. Each
-// other estimator has a wrong h, f or noise, and the test must detect this.
+// other estimator has a wrong h, f or noise, and the test must detect this fault.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -47,7 +47,7 @@ const PluginHost& AllModels() {
   return host;
 }
 
-/// Sum of e' P^-1 e over independent e ~ N(0, P). The e have `dof` elements in total.
+/// Sum of e' P^-1 e over independent e ~ N(0, P). All vectors e together have `dof` elements.
 struct ChiSquare {
   double sum = 0.0, dof = 0.0;
 
@@ -70,10 +70,10 @@ void PrintTo(const ChiSquare& x, std::ostream* out) {
   *out << x.sum / x.dof << ", 99 % in [" << bounds.low << ", " << bounds.high << "]";
 }
 
-/// NEES and NIS of each estimator over many runs. The terms of each sum are independent. NEES has
-/// the errors at the last frame of each run: of all blocks jointly, and of a landmark. NIS has all
-/// innovations of a sensor. Innovations are white over frames. Within a frame they are white
-/// because each measurement is a separate update.
+/// NEES and NIS of each estimator over many runs. The terms of each sum are independent. NEES
+/// contains the errors at the last frame of each run: of all blocks jointly, and of a landmark. NIS
+/// contains all innovations of a sensor. Innovations are white over frames. Within a frame they are
+/// white because each measurement is a separate update.
 class Tally : public RunObserver {
  public:
   using Sums = std::map<std::string, ChiSquare>;
@@ -130,7 +130,7 @@ class Tally : public RunObserver {
   }
   static void Add(const Eigen::MatrixXd& p, const Eigen::VectorXd& error, ChiSquare& nees) {
     const double square = internal::SquaredMahalanobis(p, error);
-    ASSERT_GE(square, 0.0);  // P is positive definite
+    ASSERT_GE(square, 0.0);  // holds because P is positive definite
     nees.Add(square, static_cast<int>(error.size()));
   }
 
@@ -164,7 +164,7 @@ TEST_P(ModelsProblem, OnlyTheFilterOfTheModelsIsConsistent) {
     ASSERT_EQ(result.status, RunStatus::kOk) << result.reason;
   }
   ASSERT_TRUE(tally.sums().contains("ekf"));
-  EXPECT_GE(tally.sums().size(), 2u) << "needs an estimator with a wrong model";
+  EXPECT_GE(tally.sums().size(), 2u) << "the problem needs an estimator with a wrong model";
   for (const auto& [name, sums] : tally.sums()) {
     if (name == "ekf") {
       for (const auto& [what, sum] : sums) {
@@ -173,7 +173,8 @@ TEST_P(ModelsProblem, OnlyTheFilterOfTheModelsIsConsistent) {
     } else if (!testing::kSanitized) {  // a sanitizer build has too few runs
       // A correct estimator is outside this interval once in 1e9 runs of the test, by chance.
       const auto far = [](const auto& one) { return !one.second.IsWithin(1.0 - 1e-9); };
-      EXPECT_TRUE(std::ranges::any_of(sums, far)) << name << " is not seen";
+      EXPECT_TRUE(std::ranges::any_of(sums, far))
+          << name << " has a wrong model, but no sum shows it";
     }
   }
 }
@@ -190,14 +191,14 @@ std::optional<std::string> TextAt(const Node& map, const std::string& key) {
   return child->is_map() ? TextAt(*child, key.substr(dot + 1)) : std::nullopt;
 }
 
-/// Returns the name of a model with one of its choices, such as `scale_2d with noise_model:
-/// constant`.
+/// Returns the name of a model with one of its choices, such as
+/// `scale_2d with noise_model: constant`.
 std::string With(const PluginEntry& model, const ParamInfo& param, const std::string& choice) {
   return model.name + " with " + param.key + ": " + choice;
 }
 
-/// Returns the parameters of a model that are choices. Omits those of the camera, which all models
-/// share.
+/// Returns the parameters of a model that are choices. Omits the parameters of the camera, which
+/// all models share.
 std::vector<ParamInfo> ChoicesOf(const PluginEntry& model) {
   std::vector<ParamInfo> choices = ModelSchema(model);
   std::erase_if(choices, [](const ParamInfo& param) {
@@ -243,7 +244,7 @@ TEST(ModelsProblems, AreThereForEveryModelAndChoice) {
   for (const std::string& model : needed) {
     EXPECT_TRUE(used.contains(model))
         << "no problem for " << model << ": add tests/plugins/models/consistent/NAME.yaml, a "
-        << "config with `source: {type: models}`, an estimator `ekf` and one that is wrong";
+        << "config with `source: {type: models}`, an estimator `ekf` and one with a wrong model";
   }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of full matrices R and Q from the config, in the simulator and in the filters. The filters
-// equal a Kalman filter calculated here, and the means of NIS and NEES are 1.
+// Tests full matrices R and Q from the config, in the simulator and in the filters. The filters
+// must equal a Kalman filter computed here, and the means of NIS and NEES must be 1.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -130,8 +130,8 @@ TEST(GivenNoiseRuns, EveryFilterIsTheKalmanFilter) {
   }
 }
 
-/// Returns the mean of a metric over seeds. `true_r` is the R of the simulated measurements. If it
-/// is empty, they have the R of the filter.
+/// Returns the mean of a metric over seeds. `true_r` is the R of the simulated measurements. If
+/// `true_r` is empty, the measurements have the R of the filter.
 double MeanOf(const std::string& metric, const std::string& true_r = "") {
   const int runs = testing::kSanitized ? 2 : 50;
   double sum = 0.0;
@@ -149,9 +149,9 @@ double MeanOf(const std::string& metric, const std::string& true_r = "") {
   return sum / runs;
 }
 
-// The mean of NIS has 50 runs of 41 measurements with 6 elements, so its sd is sqrt(2 / 12300) =
-// 0.013. NEES is correlated over time within a run. Its mean has at least 50 runs of 6 independent
-// elements, so its sd is at most 0.08.
+// The mean of NIS covers 50 runs of 41 measurements with 6 elements, so its standard deviation is
+// sqrt(2 / 12300) = 0.013. NEES is correlated over time within a run. Its mean covers at least 50
+// runs of 6 independent elements, so its standard deviation is at most 0.08.
 TEST(GivenNoiseRuns, TheSimulatorDrawsWhatTheFilterAssumes) {
   const double nis = MeanOf("nis.mean:poses"), nees = MeanOf("nees.mean:body");
   // The true R has the same variances, without the correlations that the filter assumes.

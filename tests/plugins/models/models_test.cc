@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of source `models`. Truth and measurements have the distribution that a filter with the
-// same config assumes. Each key has its effect.
+// Tests the source `models`. Truth and measurements must have the distribution that a filter with
+// the same config assumes, and each key must have its effect.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -71,7 +71,8 @@ void ExpectOne(const std::string& metric, const Config& config, int runs, double
 }
 
 // The mean NEES of a filter with the true models is 1. Each run has 2 degrees of freedom, which are
-// correlated over about the whole run. The sd of the mean over 300 runs is therefore at most 0.06.
+// correlated over about the whole run. The standard deviation of the mean over 300 runs is
+// therefore at most 0.06.
 TEST(Models, AFilterOfTheSameConfigIsConsistent) {
   for (const char* kind : {"continuous", "discrete"}) {
     for (const char* sensors :
@@ -174,10 +175,10 @@ TEST(Models, TheStartIsDrawnFromThePrior) {
     mean += d / kDraws;
     moment += d * d.transpose() / kDraws;
   }
-  EXPECT_LT(mean.norm(), 0.15);  // standard deviation 0.035
+  EXPECT_LT(mean.norm(), 0.15);  // the standard deviation is 0.035
   Eigen::Matrix3d expected;
   expected << 4, 1.2, 0, 1.2, 1, 0, 0, 0, 0;
-  EXPECT_LT((moment - expected).cwiseAbs().maxCoeff(), 0.4);  // largest sd 0.09
+  EXPECT_LT((moment - expected).cwiseAbs().maxCoeff(), 0.4);  // the largest deviation is 0.09
   EXPECT_EQ(moment(2, 2), 0.0);
 }
 
@@ -224,7 +225,7 @@ TEST(Models, SensorsHaveRatesGapsAndOutliers) {
   for (const SourceFrame& frame : FramesOf(Parse(text + "sensors: {stereo: {missing: 0.25}}}"))) {
     count += frame.measurements.size();
   }
-  EXPECT_NEAR(static_cast<double>(count), 7500, 200);  // standard deviation 43
+  EXPECT_NEAR(static_cast<double>(count), 7500, 200);  // the standard deviation is 43
   int far = 0, farther = 0;
   for (const SourceFrame& frame :
        FramesOf(Parse(text + "sensors: {stereo: {outliers: {share: 0.1, sigma_scale: 100}}}}"))) {

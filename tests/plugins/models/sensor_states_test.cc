@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of sensors with their own states, known numbers or several parts: from a config, in the
+// Tests sensors with their own states, known numbers or several parts: from a config, in the
 // simulator and in every estimator.
 #include <gtest/gtest.h>
 
@@ -68,7 +68,7 @@ RunResult RunOf(const std::string& text, int seed = 1) {
   return run;
 }
 
-/// Expects equal metrics of the receiver. It has the same name in both problems.
+/// Expects equal metrics of the receiver. The receiver has the same name in both problems.
 void ExpectSameReceiver(const RunResult& a, const RunResult& b, double relative) {
   ASSERT_EQ(a.estimators.size(), b.estimators.size());
   int compared = 0;
@@ -134,7 +134,7 @@ TEST(SensorStates, CanBeConsidered) {
                    b.estimators[0].metrics.at("rmse:receiver.position"));
 }
 
-/// Returns the mean over seeds of a metric for each estimator.
+/// Returns, for each estimator, the mean of a metric over seeds.
 std::map<std::string, double> MeansOf(const std::string& text, const std::string& metric,
                                       int runs) {
   std::map<std::string, double> means;
@@ -150,13 +150,13 @@ std::map<std::string, double> MeansOf(const std::string& text, const std::string
   return means;
 }
 
-// The receiver has six degrees of freedom, which are correlated over the whole run. The sd of the
-// mean over 40 runs is therefore at most 0.1.
+// The receiver has six degrees of freedom, which are correlated over the whole run. The standard
+// deviation of the mean over 40 runs is therefore at most 0.1.
 TEST(SensorStates, AFilterThatOwnsItsClockIsConsistent) {
   for (const auto& [name, nees] : MeansOf(Filled("", "", ""), "nees.mean:receiver", 40)) {
     EXPECT_NEAR(nees, 1.0, 0.25) << name;
   }
-  // This bias returns to its mean within the run, so its stationary variance matters.
+  // This bias returns to its mean within the run, so the stationary variance of the bias matters.
   const std::string markov =
       Filled("", "",
              ", initial: {clock_bias: {mean: 0, sigma: 8}}, dynamics: {clock_bias: {gauss_markov: "
@@ -186,8 +186,8 @@ TEST(SensorStates, AGaussMarkovStateKeepsItsVariance) {
     lagged += last * before / kDraws;
   }
   if (testing::kSanitized) return;
-  EXPECT_NEAR(sum, 0.0, 0.35);                               // standard deviation 0.08
-  EXPECT_NEAR(squares, 4.0, 0.9);                            // standard deviation 0.23
+  EXPECT_NEAR(sum, 0.0, 0.35);                               // the standard deviation is 0.08
+  EXPECT_NEAR(squares, 4.0, 0.9);                            // the standard deviation is 0.23
   EXPECT_NEAR(lagged / squares, std::exp(-0.5 / 1.5), 0.1);  // frames are 0.5 s apart
 }
 
@@ -210,7 +210,8 @@ const std::string kPose =
     "  ekf: {type: ekf}\n  iekf: {type: iekf}\n  root: {type: square_root_ekf}\n"
     "  ukf: {type: ukf}\n  rts: {type: rts}\n";
 
-// The body has twelve degrees of freedom. The sd of the mean over 30 runs is at most 0.08.
+// The body has twelve degrees of freedom. The standard deviation of the mean over 30 runs is at
+// most 0.08.
 TEST(SensorStates, AFilterOfPosesIsConsistent) {
   for (const auto& [name, nees] : MeansOf(kPose, "nees.mean:body", 30)) {
     EXPECT_NEAR(nees, 1.0, 0.2) << name;
@@ -242,8 +243,8 @@ std::string Late(const std::string& offset, const std::string& truth = "") {
   return text.replace(text.find("TRUTH"), 5, truth);
 }
 
-// The offset has one degree of freedom per run; the target has two, correlated over a second. The
-// sds of the means are 0.14 and 0.06.
+// The offset has one degree of freedom per run. The target has two degrees of freedom, which are
+// correlated over a second. The standard deviations of the means are 0.14 and 0.06.
 TEST(SensorStates, ATimeOffsetIsEstimatedConsistently) {
   const std::string text = Late("{mean: 0, sigma: 0.05}");
   for (const auto& [name, nees] : MeansOf(text, "nees.mean:right", 100)) {
@@ -310,12 +311,13 @@ TEST(SensorStates, RefusesByKeyAndRemedy) {
   expect(keys("dynamics: {clock_bias: {}}"), "needs exactly one kind of dynamics");
   expect(keys("dynamics: {clock_bias: {gauss_markov: {sigma: 1, time_constant_s: 0}}}"),
          "time_constant_s");
-  expect(keys("consider: [position]"), "no block 'position' in this entry");
+  expect(keys("consider: [position]"), "this entry has no block 'position'");
   expect(keys("consider: [clock_bias], constant: [clock_bias]"), "a constant has no uncertainty");
   expect(Filled("  gnss: {model: constant, blocks: {value: clock_bias}, initial: {clock_bias: "
                 "{mean: 0, sigma: 1}}}\n",
                 "", ""),
-         "the sensor owns the state 'gnss.clock_bias', but a state entry has its name");
+         "the sensor owns the state 'gnss.clock_bias', but a state entry has the same name as the "
+         "sensor");
   expect(keys("dynamics: {clock_bias: brownian}"), "expected constant, {random_walk: SIGMA}");
   expect(keys("constant: [clock_bias], initial: {clock_bias: {mean: 1}}, dynamics: {clock_bias: "
               "{random_walk: 1}}"),

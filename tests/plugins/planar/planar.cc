@@ -48,7 +48,8 @@ struct PlanarFix : alidade::Sensor<Vec<2>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"position", "m"}};
   static constexpr Quantity kMeasurement{"fix", "m"};
   double sigma_m;
-  explicit PlanarFix(alidade::Params& p) : sigma_m(p.Positive("sigma_m", "m", "of a fix")) {}
+  explicit PlanarFix(alidade::Params& p)
+      : sigma_m(p.Positive("sigma_m", "m", "noise of a fix, 1 sigma")) {}
   template <class T>
   bool Predict(const T* position, T* fix) const {
     fix[0] = position[0];
@@ -64,4 +65,4 @@ struct PlanarFix : alidade::Sensor<Vec<2>, Vec<2>> {
 }  // namespace
 
 ALIDADE_PLUGIN(ALIDADE_MOTION(Planar, "planar", "a robot in the plane", ""),
-               ALIDADE_SENSOR(PlanarFix, "planar_fix", "its position", ""))
+               ALIDADE_SENSOR(PlanarFix, "planar_fix", "position fix of the robot", ""))

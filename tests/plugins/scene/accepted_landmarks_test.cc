@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Test of the landmarks of an estimator that uses the measurements accepted by an earlier filter.
+// Tests the landmarks of an estimator that uses the measurements accepted by an earlier filter.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -25,8 +25,8 @@ class Entries : public RunObserver {
   std::map<int, std::map<std::int64_t, Timestamp>> entered;
 };
 
-// The ekf counts observations up to `min_observations`. The landmarks that it passes on have
-// therefore already waited.
+// The ekf counts observations up to `min_observations`, so the landmarks that it passes on have
+// already waited.
 TEST(AcceptedBy, LandmarksEnterAtTheSameObservation) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
   for (const auto& [key, value] :

@@ -21,7 +21,7 @@ inline const std::string kSweep =
 inline const std::string kPoints =
     "points: {box: {min: [-2, -1.5, 2], max: [2, 1.5, 6]}, count: 40}";
 
-/// Scene, with the config from which it was made.
+/// A scene and the config from which it was created.
 struct MadeScene {
   Config config;
   std::unique_ptr<Source> scene;

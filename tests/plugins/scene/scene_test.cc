@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of the measurements of the points by the camera, and of errors in the config.
+// Tests the camera's measurements of the points, and errors in the config.
 #include <Eigen/Core>
 #include <cmath>
 #include <set>
@@ -19,7 +19,7 @@ std::set<std::int64_t> Ids(const Frame& frame, int stream = 0) {
   std::set<std::int64_t> ids;
   for (const Measurement& m : frame.measurements) {
     if (m.stream != stream) continue;
-    EXPECT_TRUE(ids.insert(m.landmark).second) << "twice";
+    EXPECT_TRUE(ids.insert(m.landmark).second) << "a landmark occurs twice";
   }
   return ids;
 }
@@ -38,8 +38,8 @@ TEST(Scene, SeesAPointWhereThePinholePutsIt) {
 }
 
 TEST(Scene, SeesNothingBehindOrBesideTheImage) {
-  // Of the six points, only 1 and 4 are ahead and in the image. Half the width of the image is
-  // 320.5 px, which is 1.221 m at a distance of 2 m.
+  // Of the six points, only points 1 and 4 are ahead and in the image. Half the width of the image
+  // is 320.5 px, which is 1.221 m at a distance of 2 m.
   const auto frames = SceneFrames(
       "max_frames: 1, sigma_px: 0, points: {list: [[0, 0, -2], [0, 0, 2], [1.23, 0, 2], [0, 0, 0], "
       "[-1.21, 0, 2], [0, 0.93, 2]]}, " +
@@ -52,8 +52,8 @@ TEST(Scene, DistortsAsTheCameraDoes) {
       "max_frames: 1, sigma_px: 0, points: {list: [[0.4, 0.2, 2]]}, " + kStill, 1,
       "camera: {model: radtan, width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240, "
       "k1: -0.2, k2: 0.05, p1: 0.001, p2: 0.002}\n");
-  // With x = 0.2, y = 0.1 and q = x^2 + y^2 = 0.05, the radial factor is 1 - 0.01 + 0.000125 =
-  // 0.990125.
+  // With x = 0.2, y = 0.1 and q = x^2 + y^2 = 0.05, the radial factor is
+  // 1 - 0.01 + 0.000125 = 0.990125.
   const double x = 0.2 * 0.990125 + 2 * 0.001 * 0.02 + 0.002 * (0.05 + 0.08);
   const double y = 0.1 * 0.990125 + 0.001 * (0.05 + 0.02) + 2 * 0.002 * 0.02;
   EXPECT_NEAR(frames[0].measurements[0].values[0], 320 + 525 * x, 1e-12);
@@ -142,8 +142,8 @@ TEST(Scene, TellsTheDepthOfTheFirstObservationOfTheKnown) {
   for (const std::int64_t id : known) EXPECT_TRUE(Ids(frames[1]).contains(id));
 }
 
-// In 9 frames the camera moves forward along x and back, and rotates by 90 degrees about y and
-// back.
+// In 9 frames the camera moves forward along x and then back. At the same time, it rotates by 90
+// degrees about y and then back.
 TEST(Scene, KeyframesTellTheWayToOneAnother) {
   const std::string keys =
       "max_frames: 9, rate_hz: 1, points: {list: [[0, 0, 5], [0, 0, 6]]}, trajectory: {keyframes: "
@@ -163,15 +163,15 @@ TEST(Scene, KeyframesTellTheWayToOneAnother) {
     return found;
   };
   // The first landmark after the two points is the keyframe of the first frame. The frame measures
-  // it without noise.
+  // this keyframe without noise.
   const std::vector<Measurement> first = of_keyframes(0);
   ASSERT_EQ(first.size(), 1u);
   EXPECT_EQ(first[0].landmark, 2);
   EXPECT_EQ(first[0].values, (std::vector<double>{0, 0, 0, 1, 0, 0, 0}));
   EXPECT_EQ(first[0].covariance, std::vector<double>(36, 0.0));
   EXPECT_TRUE(of_keyframes(1).empty());
-  // At the far end the camera looks along x of the world. It measures the previous keyframe, and
-  // the keyframe of its own frame.
+  // At the far end the camera looks along x of the world. It measures two keyframes: the previous
+  // one, and that of the current frame.
   const std::vector<Measurement> far = of_keyframes(4);
   ASSERT_EQ(far.size(), 2u);
   EXPECT_EQ(far[0].landmark, 3);
@@ -179,8 +179,8 @@ TEST(Scene, KeyframesTellTheWayToOneAnother) {
   EXPECT_NEAR(far[0].values[0], 0.0, 1e-12);
   EXPECT_NEAR(far[0].values[2], back, 1e-12);
   EXPECT_TRUE(far[0].covariance.empty());
-  // Back at the start, the camera measures the previous keyframe, the first keyframe, and the
-  // keyframe of its own frame.
+  // Back at the start, the camera measures three keyframes: the previous one, the first one, and
+  // that of the current frame.
   const std::vector<Measurement> closed = of_keyframes(8);
   ASSERT_EQ(closed.size(), 3u);
   EXPECT_EQ(closed[1].landmark, 2);
@@ -226,8 +226,8 @@ TEST(Scene, PointsLieWhereTheConfigPutsThem) {
     EXPECT_EQ(std::min(low.minCoeff(), high.minCoeff()), 0.0);
     for (int i = 0; i < 3; ++i) on[i] += low[i] == 0.0, on[3 + i] += high[i] == 0.0;
   }
-  // The room has two faces each of 10, 24 and 15 m^2. Tolerances are 4 sigma of a binomial
-  // distribution.
+  // The room has two faces of 10 m^2, two of 24 m^2 and two of 15 m^2. Tolerances are 4 sigma of a
+  // binomial distribution.
   const double share[3] = {10.0 / 98, 24.0 / 98, 15.0 / 98};
   for (int i = 0; i < 6; ++i) {
     const double p = share[i % 3];
@@ -265,29 +265,29 @@ TEST(Scene, RefusesWhatMakesNoScene) {
   refused(kPoints, "trajectory: missing key, needed by scene");
   refused(kStill + ", points: {bix: 3}", "points.bix: unknown key; did you mean 'box'?");
   refused(kStill + ", points: {count: 3}",
-          "points: the kind is missing; expected one of list, box, room, shells");
+          "points: a key is missing; expected one of list, box, room, shells");
   refused(kStill + ", points: {list: [[1, 2, 3]], count: 3}",
           "points.count: the number of points follows from the list");
   refused(kStill + ", points: {list: [[1, 2]]}", "points.list[0]");
   refused(kStill + ", points: {box: {min: [0, 0, 0], max: [1, 0, 1]}, count: 3}",
-          "points.box.max: not above 'min' in x, y and z");
+          "points.box.max: 'max' does not exceed 'min'");
   refused(kStill + ", points: {shells: {radii: [1, -1]}, count: 3}",
-          "points.shells.radii: a radius that is not positive");
+          "points.shells.radii: a radius is not positive");
   refused(kPoints + ", trajectory: {}", "expected one of look_at, keyframes, random");
   refused(kPoints + ", trajectory: {look_at: [{position: [0, 0, 0], target: [0, -2, 0]}]}",
-          "trajectory.look_at: at -0.033333 s the camera has no orientation");
+          "trajectory.look_at: at -0.033333 s the orientation of the camera");
   refused(kPoints +
               ", trajectory: {up: [0, 0, 1], random: {linear_acceleration: 1, "
               "angular_acceleration: 1}}",
-          "trajectory.up: has no effect without 'look_at'");
+          "trajectory.up: this key has no effect without 'look_at'");
   refused(kPoints +
               ", trajectory: {keyframes: [{position: [0, 0, 0], matrix: [[1, 0, 0], "
               "[0, 1, 0], [0, 0, -1]]}]}",
-          "matrix: not a rotation; expected R R' = I to 1e-3, determinant 1");
+          "matrix: the matrix is not a rotation; expected R R' = I to 1e-3, and determinant 1");
   refused(kPoints +
               ", trajectory: {keyframes: [{position: [0, 0, 0], quaternion: "
               "{w: 1, x: 1, y: 0, z: 0}}]}",
-          "quaternion: not of unit length");
+          "quaternion: the quaternion does not have unit length");
   refused(kPoints +
               ", trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0], "
               "axis_angle_deg: [0, 0, 1, 5]}]}",
@@ -295,14 +295,14 @@ TEST(Scene, RefusesWhatMakesNoScene) {
   refused(kPoints +
               ", trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], euler_deg: "
               "[0, 0, 0]}, {t_s: 0, position: [0, 0, 0], euler_deg: [0, 0, 0]}]}",
-          "keyframes[1].t_s: not later than the time of the previous item");
+          "keyframes[1].t_s: this time is not later than the time of the previous item");
   refused(kPoints +
               ", max_frames: 31, trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], "
               "euler_deg: [0, 0, 0]}, {t_s: 0.5, position: [0, 0, 0], euler_deg: "
               "[0, 0, 0]}]}",
           "keyframes[1].t_s: the trajectory ends before the last frame; expected at least 1.0");
   refused(kPoints + ", trajectory: {random: {linear_acceleration: -1, angular_acceleration: 1}}",
-          "trajectory.random.linear_acceleration: negative");
+          "trajectory.random.linear_acceleration: a standard deviation is negative");
   refused(kPoints + ", " + kStill + ", sigma_px: -1", "source.sigma_px: '-1'");
   refused(
       kPoints + ", " + kStill + ", measures: depth, sigma_depth_m: 0.1, known_points: {count: 3}",

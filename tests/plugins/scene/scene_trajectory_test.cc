@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of curves through way-points and key frames, and of the trajectories that use these curves.
+// Tests curves through way-points and key frames, and the trajectories that use these curves.
 #include <Eigen/Geometry>
 #include <cmath>
 
@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-const std::vector<double> kTimes{0.0, 0.7, 1.0, 2.5};  // with unequal intervals
+const std::vector<double> kTimes{0.0, 0.7, 1.0, 2.5};  // the intervals are unequal
 
 Quaternion Turned(double x, double y, double z) {
   const double d[3] = {x, y, z};
@@ -43,8 +43,8 @@ TEST(CubicSpline, PassesThroughItsPoints) {
 
 TEST(CubicSpline, SlopeAndCurvatureAreContinuousAndVanishAtTheEnds) {
   // Compares differences over h on both sides of each knot. A jump of the slope would change the
-  // first differences, a jump of the curvature the second differences. The third derivative is
-  // below 200, so it contributes 0.02 for h = 1e-4.
+  // first differences, and a jump of the curvature would change the second differences. The third
+  // derivative is below 200, so it contributes 0.02 for h = 1e-4.
   const CubicSpline spline(kTimes, Points());
   constexpr double h = 1e-4;
   const auto second = [&](double t) {
@@ -152,8 +152,7 @@ TEST(ScenePath, EveryFormOfAnOrientationSaysTheSame) {
                            "quaternion: {w: 0.70710678, x: 0, y: 0.70710678, z: 0}"}) {
     EXPECT_LT((ahead(form) - Vector3d::UnitX()).norm(), 1e-7) << form;
   }
-  // In Rz(90) Ry(0) Rx(90), the rotation about x maps z to -y, and the rotation about z maps -y to
-  // x.
+  // In Rz(90) Ry(0) Rx(90), the rotation about x maps z to -y. The rotation about z maps -y to x.
   EXPECT_LT((ahead("euler_deg: [90, 0, 90]") - Vector3d::UnitX()).norm(), 1e-15);
 }
 

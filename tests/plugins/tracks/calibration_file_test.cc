@@ -117,8 +117,8 @@ TEST_F(CalibrationFileForms, WhatNoCameraHereDoesIsRefused) {
   expect(changed(kKalibr, "pinhole", "omni"), "'omni'");
   expect(changed(kKalibr, "equidistant", "fov"), "'fov'");
   expect(changed(kRos, "401", "nan"), "camera_matrix");
-  expect(changed(kRos, "[400, 0,", "[400, 2,"), "zero skew");
-  expect(changed(kRos, "[0, 0, 0, 0, 0]", "[0, 0, 0, 0, 0, 0.1, 0, 0]"), "beyond the first 5");
+  expect(changed(kRos, "[400, 0,", "[400, 2,"), "without skew");
+  expect(changed(kRos, "[0, 0, 0, 0, 0]", "[0, 0, 0, 0, 0, 0.1, 0, 0]"), "after the first 5");
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests of reading tracks: representations, times, the files next to the tracks, pipes and real
+// Tests how tracks are read: representations, times, the files next to the tracks, pipes and real
 // data.
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -82,8 +82,8 @@ TEST_F(TracksTest, MayBeginLaterAndWithoutTheFeaturesOfBefore) {
       [&] { ids(", start_frame: 4"); });
 }
 
-// The camera of frame 1 is at (1, 2, 3), rotated by 90 degrees about z. Its x axis is then the y
-// axis of the file's world.
+// The camera of frame 1 is at (1, 2, 3), rotated by 90 degrees about z. The x axis of the camera is
+// then the y axis of the file's world.
 TEST_F(TracksTest, TheWorldMayBeTheFirstCamera) {
   Write("tracks.csv", "0,1,0,1\n0,1,1,1\n1,1,0,2\n1,1,1,2\n2,1,0,4\n2,1,1,4\n");
   Write("truth.tum", "0.1 1 2 3 0 0 0.7071067811865476 0.7071067811865476\n0.2 1 7 3.5 0 0 1 0\n");
@@ -190,7 +190,7 @@ TEST_F(TracksTest, ReadsAPipeAsItIsWritten) {
   EXPECT_FALSE(source->Next(frame));
 }
 
-// Fault 47 of tests/faults/README.md.
+// Tests fault 47 of tests/faults/README.md.
 TEST_F(TracksTest, StreamsALongFileInConstantMemory) {
   // A thread writes 2e6 rows, about 30 MB, to a pipe. The peak memory may grow by 4 MB.
   const auto peak_kb = [] {
@@ -227,7 +227,7 @@ TEST_F(TracksTest, ReadsRealTracks) {
   const char* const data = std::getenv("ALIDADE_DATA");
   if (data == nullptr) GTEST_SKIP() << "ALIDADE_DATA is not set";
   const std::string drive = std::string(data) + "/kitti-stereo-tracks/drive_0001";
-  if (!fs::exists(drive)) GTEST_SKIP() << "no " << drive;
+  if (!fs::exists(drive)) GTEST_SKIP() << drive << " does not exist";
   const auto frames = Frames("measures: stereo, odometry: mean", drive);
   ASSERT_EQ(frames.size(), 108u);
   std::size_t observations = 0;

@@ -60,8 +60,8 @@ class BundleFiles : public ::testing::Test {
 };
 
 /// The camera is rotated by 90 degrees about its z axis, (x, y) -> (-y, x), and translated. It has
-/// f = 100 px and k1 = 1. The point (0.2, 0.1, -3) is at (-0.1, 0.2, -3) + (0, 0, 1) in its frame:
-/// p = (-0.05, 0.1), q = 0.0125, z = 101.25 p.
+/// f = 100 px and k1 = 1. In the frame of the camera, the point (0.2, 0.1, -3) is at (-0.1, 0.2,
+/// -3) + (0, 0, 1): p = (-0.05, 0.1), q = 0.0125, z = 101.25 p.
 const std::string kBal =
     "1 1 1\n0 0 -5.0625e+00 1.0125e+01\n"
     "0\n0\n1.5707963267948966\n0\n0\n1\n100\n1\n0\n0.2\n0.1\n-3\n";
@@ -95,7 +95,8 @@ TEST_F(BundleFiles, BalIsReadAndWrittenWithoutALoss) {
   }
 }
 
-/// Contains the camera of kBal, an unregistered camera, and a point without an observation.
+/// The text contains the camera of kBal, an unregistered camera, and a point without an
+/// observation.
 const std::string kBundler =
     "# Bundle file v0.3\n2 2\n100 1 0\n0 -1 0\n1 0 0\n0 0 1\n0 0 1\n"
     "0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n"
@@ -154,7 +155,8 @@ TEST_F(BundleFiles, ReadsLibmvOfEitherByteOrder) {
     EXPECT_EQ(file.format, BundleFormat::kLibmv);
     EXPECT_EQ(file.camera_ids, std::vector<std::int64_t>{7});
     EXPECT_EQ(file.point_ids, std::vector<std::int64_t>{9});
-    EXPECT_LT(BundleRms(*sensor, file.problem), 1e-4) << "32-bit numbers";
+    EXPECT_LT(BundleRms(*sensor, file.problem), 1e-4)
+        << "the tolerance covers the rounding of 32-bit numbers";
     EXPECT_EQ(BundleText(file), Libmv(true));
   }
 }
@@ -171,7 +173,7 @@ TEST_F(BundleFiles, RefusesBadBal) {
   ExpectBad(kBal.substr(0, kBal.size() - 4), {"the file ends here; expected a point"});
   std::string text = kBal;
   ExpectBad(text.replace(text.find("100"), 3, "-10"),
-            {":9:1: the focal length is not positive", "px above 0"});
+            {":9:1: the focal length is not positive", "a positive number in px"});
   ExpectBad(kBal + "5\n", {":15:1: the file contains additional numbers"});
   for (const char* magic : {"\x1F\x8B\x08", "BZh9",
                             "\xFD"
@@ -187,11 +189,11 @@ TEST_F(BundleFiles, RefusesBadBal) {
 
 TEST_F(BundleFiles, RefusesBadBundler) {
   ExpectBad("# Bundle file v0.4\n1 1\n",
-            {":1:1: '# Bundle file v0.4'; expected # Bundle file v0.3"});
+            {":1:1: the header is '# Bundle file v0.4'; expected '# Bundle file v0.3'"});
   std::string text = kBundler;
   ExpectBad(text.replace(text.find("0 -1 0"), 6, "0 -2 0"), {":6:5:", "are not a rotation matrix"});
   text = kBundler;
-  ExpectBad(text.replace(text.find("1 0 42"), 6, "1 1 42"), {"this camera is not registered"});
+  ExpectBad(text.replace(text.find("1 0 42"), 6, "1 1 42"), {"observed camera is not registered"});
   text = kBundler;
   ExpectBad(text.replace(text.find("100"), 3, "-10"), {":3:1: the focal length is not positive"});
   text = kBundler;
@@ -215,7 +217,7 @@ TEST_F(BundleFiles, RefusesBadLibmv) {
   ExpectBad(bad, {"byte 114: the image of the marker has no camera"});
   bad = good;
   bad[5] = static_cast<char>(0x7F), bad[4] = static_cast<char>(0xC0);
-  ExpectBad(bad, {"byte 2: intrinsics is not finite"});
+  ExpectBad(bad, {"byte 2: a number of the intrinsics is not finite"});
 }
 
 TEST_F(BundleFiles, SavesTheProblemPosesAndPoints) {
@@ -236,7 +238,7 @@ TEST_F(BundleFiles, SavesTheProblemPosesAndPoints) {
   EXPECT_TRUE(line("poses.tum", 1).starts_with("0 ")) << line("poses.tum", 1);
   EXPECT_NE(line("bundle.json", 3).find("\"status\": \"converged\""), std::string::npos);
   ExpectSame(ReadBundle(folder_ / "o" / "problem.txt"), file);
-  EXPECT_THROW(BundleFolder(folder_ / "o", false), Error) << "it is there";
+  EXPECT_THROW(BundleFolder(folder_ / "o", false), Error) << "the folder already exists";
 }
 
 /// The unregistered camera of kBundler has no pose. A zero is written without a sign.

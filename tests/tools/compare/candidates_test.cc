@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Comparisons of constructed runs: tests the reference of each estimator, and runs with different
+// Tests comparisons of constructed runs: the reference of each estimator, and runs with different
 // data.
 #include "alidade/compare/candidates.h"
 
@@ -80,8 +80,8 @@ TEST(CompareRuns, HoldsAnEstimatorAgainstTheBatchOfItsSensors) {
       << text;
 }
 
-// A batch with other overrides, such as a robust loss, solves another problem. It is the reference
-// only if no batch of the same problem is usable.
+// A batch with other overrides, such as a robust loss, solves another problem. Such a batch is the
+// reference only if no batch of the same problem is usable.
 TEST(CompareRuns, OverridesMakeAnotherSystem) {
   Candidate other = Entry("other", "ceres_batch", true, 8.0);
   other.result.overrides = "{sensors: {stereo: {loss: {cauchy: 1}}}}";
@@ -108,7 +108,8 @@ TEST(CompareRuns, ABatchThatFailedGivesWayToOneThatDidNot) {
   }
   const Comparison alone = CompareRuns({RunOf({failed, ekf})}, {});
   EXPECT_EQ(alone.withheld,
-            "no reference: estimator 'failed' failed, the comparison with it is withheld");
+            "no reference is available: estimator 'failed' failed, so the comparison with this "
+            "estimator is withheld");
 }
 
 // Without measurements the filter and the batch agree, because both have only the prior.
@@ -128,8 +129,9 @@ TEST(CompareRuns, TellsOfRejectionRecoveryOfTheFilter) {
   EXPECT_TRUE(CompareRuns({run}, {}).notes.empty());
   run.estimators[0].had_rejection_recovery = true;
   EXPECT_EQ(CompareRuns({run}, {}).notes,
-            std::vector<std::string>{"'ekf' recovered from rejections: the steps to a batch or "
-                                     "smoother include the cost of the recovery"});
+            std::vector<std::string>{
+                "'ekf' recovered from consecutive rejections: the steps to a batch or smoother "
+                "include the cost of this recovery"});
 }
 
 TEST(CompareRuns, HasTheWorstStatusOfTheRuns) {
@@ -163,7 +165,7 @@ TEST(CompareRuns, ExplainsTheGapOfAFilterAlone) {
   EXPECT_EQ(CompareRuns({run}, {"", "ekf", true}).decomposed, "ekf");
 }
 
-/// Adds a map of three landmarks. Each has the error `error` along x.
+/// Adds a map of three landmarks. Each landmark has the error `error` along x.
 Candidate WithMap(Candidate entry, double error) {
   const Eigen::Vector3d places[] = {{0, 0, 1}, {1, 0, 2}, {0, 1, 3}};
   entry.result.landmarks.emplace();
@@ -177,7 +179,7 @@ Candidate WithMap(Candidate entry, double error) {
 }
 
 // With landmarks no batch solves at every frame. At the last frame the batch of all data has used
-// the same data as the filter, so the two are compared there.
+// the same data as the filter, so the batch and the filter are compared at that frame.
 TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
   Candidate ekf = WithMap(Entry("ekf", "ekf", false, 2.0), 0.5);
   ekf.series.values = {9.0, 9.0, 2.0};
@@ -203,8 +205,8 @@ TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
   EXPECT_NE(CompareJson(comparison).find("\"at_end\": true"), std::string::npos);
 }
 
-// If the batch of the accepted measurements also exists, it is the reference. The effect of the
-// gate is then another step.
+// If the batch of the accepted measurements also exists, this batch is the reference. The effect of
+// the gate is then a separate step of the decomposition.
 TEST(CompareRuns, TheLastFrameIsThatOfTheBatchOfWhatTheFilterAccepted) {
   Candidate accepted = Entry("accepted", "ceres_batch", true, 1.0);
   accepted.result.accepted_by = "ekf";
@@ -241,20 +243,20 @@ TEST(CheckSameData, TellsTheFirstTimestampWhateverTheColumnsAndTheOrderOfStreams
   const std::string text =
       Refusal("t_s,stream,landmark,v0,v1\n0.1,a,,1,\n0.1,b,,2,3\n0.2,a,,4,\n0.3,a,,5,\n",
               "t_s,stream,landmark,v0,v1,v2\n0.1,b,,2,3,\n0.1,a,,1,,\n0.2,a,,4,,\n0.3,a,,6,,\n");
-  EXPECT_NE(text.find("first difference: t = 0.3 s;"), text.npos) << text;
+  EXPECT_NE(text.find("the first difference is at t = 0.3 s;"), text.npos) << text;
 }
 
 TEST(CheckSameData, TheOrderWithinAStreamIsData) {
   const std::string header = "t_s,stream,landmark,v0\n";
   const std::string text =
       Refusal(header + "0.1,a,,1\n0.2,a,,1\n0.2,a,,2\n", header + "0.1,a,,1\n0.2,a,,2\n0.2,a,,1\n");
-  EXPECT_NE(text.find("first difference: t = 0.2 s;"), text.npos) << text;
+  EXPECT_NE(text.find("the first difference is at t = 0.2 s;"), text.npos) << text;
 }
 
 TEST(CheckSameData, SaysWhereARunHasLessAndWhereTheFilesDoNotTell) {
   const std::string rows = "t_s,stream,landmark,v0\n0.1,a,,1\n";
   EXPECT_NE(Refusal(rows + "0.2,a,,1\n", rows)
-                .find("first difference: the end of the file instead of t = 0.2 s"),
+                .find("the end of the file, the other file has t = 0.2 s there"),
             std::string::npos);
   EXPECT_NE(Refusal(rows, rows)
                 .find("the covariances of measurements or the timestamps of empty frames differ"),

@@ -12,8 +12,8 @@
 namespace alidade {
 namespace {
 
-/// Returns n runs of a filter and its reference. Their errors are e = 1.1 r + N(0, 0.1^2) and r ~ 3
-/// + N(0, 0.5^2).
+/// Returns n runs of a filter and its reference. Their errors are e = 1.1 r + N(0, 0.1^2) and
+/// r ~ 3 + N(0, 0.5^2).
 std::vector<Ratio> CorrelatedRuns(int n) {
   Random random(7);
   std::vector<Ratio> runs;
@@ -24,10 +24,10 @@ std::vector<Ratio> CorrelatedRuns(int n) {
   return runs;
 }
 
-// The delta method gives the same interval independently, rho -+ 1.96 sigma, with
+// The delta method independently gives the same interval, rho -+ 1.96 sigma, with
 // sigma^2 = var(mean(e) / mean(r)) = mean((e - rho r)^2) / (n mean(r)^2).
 // With 5000 samples a quantile at 2.5 % has an error of
-// sigma sqrt(0.025 0.975 / 5000) / 0.0584 = 0.04 sigma. The test allows four times this error.
+// sigma sqrt(0.025 * 0.975 / 5000) / 0.0584 = 0.04 sigma. The test allows four times this error.
 TEST(RatioOfMeans, HasTheIntervalOfTheDeltaMethod) {
   const std::vector<Ratio> runs = CorrelatedRuns(400);
   const Ratio ratio = RatioOfMeans(runs);
@@ -47,8 +47,8 @@ TEST(RatioOfMeans, HasTheIntervalOfTheDeltaMethod) {
   EXPECT_NEAR(ratio.interval->high, ratio.value() + 1.96 * sigma, 0.16 * sigma);
 }
 
-// The difficulty of a run affects the errors of both estimators equally, so it cancels in the
-// ratio. Without pairing the interval would not have zero width.
+// The difficulty of a run affects the errors of both estimators equally, so the difficulty cancels
+// in the ratio. Without pairing the interval would not have zero width.
 TEST(RatioOfMeans, IsPaired) {
   Random random(3);
   std::vector<Ratio> runs;
@@ -62,8 +62,8 @@ TEST(RatioOfMeans, IsPaired) {
 }
 
 // The two runs have the ratios 1 / 2 and 3 / 2. A resampled pair has the sums 2 / 4, 4 / 4 or 6 / 4
-// with probabilities 1/4, 1/2 and 1/4. The result is the ratio of the means, 1. It is not the mean
-// of the ratios of the runs.
+// with probabilities 1/4, 1/2 and 1/4. The result is 1, the ratio of the means, not the mean of the
+// ratios of the runs.
 TEST(RatioOfMeans, OfTwoRunsIsEnumerated) {
   const Ratio ratio = RatioOfMeans({{1.0, 2.0}, {3.0, 2.0}});
   EXPECT_EQ(ratio.value(), 1.0);
@@ -98,8 +98,8 @@ TEST(IntervalOfMean, IsThatOfTheNormalDistribution) {
   EXPECT_NEAR(interval.high, mean + 0.196, 0.02);
 }
 
-/// Returns a run of one block and one owner with these errors and NEES at the timestamps 10, 20,
-/// ...
+/// Returns a run of one block and one owner, with the given errors and NEES at the timestamps 10,
+/// 20, ...
 ErrorSeries SeriesOf(const std::vector<double>& errors, const std::vector<double>& nees) {
   ErrorSeries series;
   series.blocks = {"p.x"};
@@ -120,8 +120,9 @@ OverTime Over(const std::vector<ErrorSeries>& runs) {
   return ComputeOverTime(pointers);
 }
 
-// Tabulated chi-square with 10 degrees of freedom: 3.247 at 0.025 and 20.483 at 0.975
-// [BarShalom2001, table 1.5.4-1]. Five runs with two degrees of freedom each have ten.
+// The tabulated quantiles of chi-square with 10 degrees of freedom are 3.247 at 0.025 and 20.483 at
+// 0.975 [BarShalom2001, table 1.5.4-1]. Five runs with two degrees of freedom each have ten degrees
+// of freedom.
 TEST(ComputeOverTime, AverageNeesHasTheBoundsOfChiSquare) {
   std::vector<ErrorSeries> runs;
   for (const double nees : {1.0, 2.0, 3.0, 4.0, 5.0}) {
@@ -135,8 +136,8 @@ TEST(ComputeOverTime, AverageNeesHasTheBoundsOfChiSquare) {
   EXPECT_EQ(nees.inside, 0.5);
 }
 
-// 200 runs have NEES ~ chi2(2), so 95 % of 500 independent timestamps are inside the bounds. The
-// share has a standard deviation of sqrt(0.95 0.05 / 500) = 1 %.
+// 200 runs have NEES ~ chi2(2), so 95 % of 500 independent timestamps are expected inside the
+// bounds. This proportion has a standard deviation of sqrt(0.95 * 0.05 / 500) = 1 %.
 TEST(ComputeOverTime, AverageNeesOfAConsistentFilterIsInside) {
   Random random(5);
   std::vector<ErrorSeries> runs;
@@ -152,7 +153,7 @@ TEST(ComputeOverTime, ErrorsHaveRmsAndQuantiles) {
   std::vector<ErrorSeries> runs;
   for (int r = 0; r <= 100; ++r) runs.push_back(SeriesOf({0.01 * r}, {1.0}));
   const OverTime::Error error = Over(runs).errors.at("p.x");
-  // The sum of r^2 for r = 0 to 100 is 100 101 201 / 6.
+  // The sum of r^2 for r = 0 to 100 is 100 * 101 * 201 / 6.
   EXPECT_NEAR(error.rms[0], 0.01 * std::sqrt(100.0 * 201.0 / 6.0), 1e-12);
   EXPECT_NEAR(error.low[0], 0.16, 1e-12);
   EXPECT_NEAR(error.high[0], 0.84, 1e-12);

@@ -53,7 +53,7 @@ TEST(CompareReport, NamesNoRowsIfNoneIsLeftOut) {
   EXPECT_FALSE(Contains(CompareReport(comparison, TableStyle::kText, ReportRows::kMain), "--all"));
 }
 
-// With fewer than ten runs the report says that there are too few, whatever their interval is.
+// With fewer than ten runs, the report states that there are too few, regardless of their interval.
 TEST(CompareReport, IntervalsOfFewRunsAreSaidToBeSo) {
   for (const std::int64_t runs : {3, 9, 10}) {
     Comparison comparison = Compared("truth", {"rmse:p.x"});

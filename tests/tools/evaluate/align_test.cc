@@ -96,7 +96,7 @@ TEST(Align, RefusesWhatDeterminesNoScale) {
     reference.positions.col(i) << (i % 2 == 0 ? -1.0 : 1.0), 0.0, 0.0;
     estimate.positions.col(i) << (i % 4 < 2 ? -1.0 : 1.0), 0.0, 0.0;
   }
-  for (const double off : {0.0, 0.1}) {  // with 0.1, rounding gives a scale of 1e-17
+  for (const double off : {0.0, 0.1}) {  // for 0.1, rounding gives a scale of 1e-17
     estimate.positions.row(0).array() += off;
     for (const Alignment alignment : {Alignment::kSim3, Alignment::kScale}) {
       try {
@@ -107,7 +107,8 @@ TEST(Align, RefusesWhatDeterminesNoScale) {
         EXPECT_STREQ(
             error.what(),
             "curve.tum: the scale is undetermined: the positions are not correlated with those of "
-            "curve.tum; expected poses of the same trajectory, or --align");
+            "curve.tum; expected poses of the same trajectory, or --align, which does not estimate "
+            "the scale");
       }
     }
     const Evaluation e = Evaluate(reference, estimate, {});
@@ -131,7 +132,7 @@ TEST(Associate, EachOfTheShorterTakesTheNearestOfTheLongerWithinTheTolerance) {
   EXPECT_EQ(matches.possible, 4);
   EXPECT_EQ(matches.reference, (std::vector<int>{0, 0, 3}));
   EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 3}));
-  // Each pose of the shorter trajectory is matched, whichever of the two trajectories is the
+  // Each pose of the shorter trajectory is matched, whether the reference or the estimate is
   // shorter.
   const Matches other = Associate(At({0.006, 3.01}), reference, 10'000'000, 0);
   EXPECT_EQ(other.possible, 2);
@@ -166,9 +167,10 @@ TEST(Associate, TheOffsetIsAddedToTheEstimate) {
     EXPECT_EQ(error.code(), ExitCode::kBadData);
     EXPECT_STREQ(
         error.what(),
-        "curve.tum: no pose is within 0.001 s of a pose of curve.tum: 0.000000 s to 2.000000 s "
-        "compared with 10.000000 s to 13.000000 s; expected timestamps of the same clock; or "
-        "--t-offset, which is added to the timestamps of the estimate; or a larger --t-max-diff");
+        "curve.tum: no pose is within 0.001 s of a pose of curve.tum: the timestamps are from "
+        "0.000000 s to 2.000000 s, those of the reference from 10.000000 s to 13.000000 s; "
+        "expected timestamps of the same clock; or --t-offset, which is added to the timestamps of "
+        "the estimate; or a larger --t-max-diff");
   }
 }
 
@@ -178,7 +180,7 @@ TEST(Associate, NamesTheOffsetWhereItIsToBlame) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what())
-                  .find("0.000000 s to 1.000000 s and --t-offset compared with "
+                  .find("0.000000 s to 1.000000 s plus --t-offset, those of the reference from "
                         "0.000000 s to 1.000000 s"),
               std::string::npos)
         << error.what();
@@ -200,14 +202,12 @@ TEST(Associate, RefusesAnOffsetThatNoTimestampHolds) {
   };
   EXPECT_EQ(
       refusal(two, one, kOffset),
-      "curve.tum --t-offset: 9000000000.000000 s added to the timestamps is beyond 292 years; "
-      "expected the "
-      "time between the two clocks");
+      "curve.tum --t-offset: a timestamp plus 9000000000.000000 s is beyond 292 years; expected "
+      "the time between the two clocks");
   EXPECT_EQ(
       refusal(one, two, -kOffset),
-      "curve.tum --t-offset: -9000000000.000000 s added to the timestamps is beyond 292 years; "
-      "expected the "
-      "time between the two clocks");
+      "curve.tum --t-offset: a timestamp plus -9000000000.000000 s is beyond 292 years; expected "
+      "the time between the two clocks");
 }
 
 TEST(Associate, WithoutTimestampsByRow) {
@@ -219,7 +219,7 @@ TEST(Associate, WithoutTimestampsByRow) {
   EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 2, 3}));
   EXPECT_THROW(Associate(bare, five, 0, 0), Error);
   EXPECT_THROW(Associate(bare, Curve(4), 0, 0), Error);
-  // KITTI files are matched row by row if either of them has no times.
+  // KITTI files are matched row by row if one of the two files has no times.
   Trajectory timed = Curve(4);
   timed.format = bare.format = five.format = TrajectoryFormat::kKitti;
   EXPECT_TRUE(Associate(timed, bare, 0, 0).by_row);
@@ -235,13 +235,13 @@ TEST(Associate, WithoutTimestampsByRow) {
   timed.name = "timed.txt";
   five.name = "five.txt";
   EXPECT_EQ(refusal(timed, five),
-            "five.txt: 5 poses without timestamps, but timed.txt has 4 poses; expected a row for "
-            "each row "
-            "of the reference, or timestamps in both (KITTI: NAME_times.txt next to NAME.txt)");
+            "five.txt: the file has 5 poses without timestamps, but timed.txt has 4 poses; "
+            "expected a row for each row of the reference, or timestamps for both files (KITTI: "
+            "NAME_times.txt next to NAME.txt)");
   EXPECT_EQ(refusal(five, timed),
-            "five.txt: 5 poses without timestamps, but timed.txt has 4 poses; expected a row for "
-            "each row "
-            "of the estimate, or timestamps in both (KITTI: NAME_times.txt next to NAME.txt)");
+            "five.txt: the file has 5 poses without timestamps, but timed.txt has 4 poses; "
+            "expected a row for each row of the estimate, or timestamps for both files (KITTI: "
+            "NAME_times.txt next to NAME.txt)");
 }
 
 TEST(Associate, KittiWithTimesBesideBothGoesByThem) {

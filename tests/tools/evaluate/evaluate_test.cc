@@ -153,12 +153,12 @@ TEST(PairsOf, RefusesMorePairsThanAnyoneReads) {
   constexpr int kPoses = 4480;  // all poses are equal, so there are 4480 * 4479 / 2 > 1e7 pairs
   try {
     PairsOf(Line(kPoses, 0.0), options);
-    ADD_FAILURE() << "no error";
+    ADD_FAILURE() << "no error; expected the limit on the number of pairs";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::kBadData);
     EXPECT_STREQ(
         error.what(),
-        "curve.tum --delta: more than 10000000 pairs of poses are this far apart; expected a "
+        "curve.tum --delta: more than 10000000 pairs of poses have this rotation; expected a "
         "larger --delta, or a smaller --delta-tol");
   }
 }
@@ -259,7 +259,8 @@ TEST(Evaluate, NeesIsWithheldOfAnAlignedEstimate) {
     EXPECT_FALSE(e.position_nees || e.orientation_nees);
     EXPECT_EQ(e.nees_withheld,
               std::string("the alignment by ") + ToString(alignment) +
-                  " removes part of the error that the covariance describes; omit the alignment");
+                  " removes part of the error that the covariance describes; for the NEES, omit "
+                  "the alignment");
   }
 }
 

@@ -19,7 +19,7 @@ class PublicFigures : public ::testing::Test {
     const char* data = std::getenv("ALIDADE_DATA");
     if (data != nullptr) folder_ = std::filesystem::path(data) / "trajectories";
     if (!std::filesystem::is_directory(folder_)) {
-      GTEST_SKIP() << "ALIDADE_DATA has no trajectories";
+      GTEST_SKIP() << "ALIDADE_DATA does not contain trajectories";
     }
   }
   Evaluation Compare(const std::string& reference, const std::string& estimate,
@@ -68,8 +68,8 @@ TEST_F(PublicFigures, MonocularDeskIsAsPublishedToTheLastDigit) {
   ExpectFigures(se3, 118, "1.000000", "0.939049");
   ASSERT_EQ(se3.warnings.size(), 1u);
   EXPECT_NE(
-      se3.warnings[0].find("scale 2.228 (error 0.007729 m with sim3, 0.939 m with se3): probably "
-                           "a run without metric scale; expected -as"),
+      se3.warnings[0].find("the scale is 2.228 (the error is 0.007729 m with sim3 and 0.939 m with "
+                           "se3): the estimate probably has no metric scale"),
       std::string::npos)
       << se3.warnings[0];
   const Evaluation sim3 = Compare(truth, mono, Alignment::kSim3);

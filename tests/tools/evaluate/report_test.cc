@@ -12,7 +12,7 @@ namespace {
 using Eigen::Vector3d;
 using testing::Curve;
 
-/// Shifts a curve by 5 cm and returns its evaluation against the original curve.
+/// Returns the evaluation of a curve that is shifted by 5 cm, relative to the original curve.
 Evaluation Moved(Alignment alignment, const std::string& label, EvaluateOptions options = {}) {
   Trajectory estimate = Curve(30);
   estimate.positions.row(0).array() += 0.05;
@@ -80,7 +80,8 @@ TEST(EvaluationReport, NeesNamesItsQuantityItsDofAndItsPoses) {
   Evaluation evaluation = Moved(Alignment::kNone, "a");
   evaluation.position_nees = Nees{2, 1.5, 1.0};
   EXPECT_NE(EvaluationText({evaluation})
-                .find("NEES position (3 dof) 1.5 per dof, 100 % within 95 %, 2 of 30 poses\n"
+                .find("NEES position (3 dof) 1.5 per dof, 100 % within the 95 % bound, 2 of 30 "
+                      "poses\n"
                       "This NEES is marginal: position and orientation are evaluated separately. "
                       "nees.mean in "
                       "run.json is the joint NEES of all states of a model.\n"),

@@ -36,7 +36,7 @@ class TrajectoryFiles : public ::testing::Test {
     }
     return {};
   }
-  /// Returns the warnings for a file with this text, one in each line, without the path of the
+  /// Returns the warnings for a file with this text, one warning per line, without the path of the
   /// folder.
   std::string WarningsOf(const std::string& text) const {
     std::string all;
@@ -96,15 +96,15 @@ TEST_F(TrajectoryFiles, KittiTakesItsTimestampsFromTheFileBeside) {
   Write("poses_times.txt", "5\n6\n");
   EXPECT_EQ(Read(rows).timestamps, (std::vector<Timestamp>{5'000'000'000, 6'000'000'000}));
   Write("poses_times.txt", "5\n");
-  EXPECT_NE(Refusal(rows).find("poses_times.txt:1: 1 times for 2 poses of "), std::string::npos);
+  EXPECT_NE(Refusal(rows).find("times.txt:1: the number of times is 1, "), std::string::npos);
   EXPECT_NE(Refusal(rows).find("; expected one time for each pose"), std::string::npos);
-  // times.txt can belong to several files. The message tells how to give this file times of its
-  // own.
+  // times.txt can belong to several files. The message states how to provide separate times for
+  // this file.
   fs::remove(folder_ / "poses_times.txt");
   Write("times.txt", "0\n1\n2\n");
-  EXPECT_NE(Refusal(rows).find("times.txt:3: 3 times for 2 poses of "), std::string::npos);
+  EXPECT_NE(Refusal(rows).find("times.txt:3: the number of times is 3, but "), std::string::npos);
   EXPECT_NE(Refusal(rows).find(
-                "; expected one time for each pose, or poses_times.txt in the same folder"),
+                "; expected one time for each pose, or a file poses_times.txt in the same folder"),
             std::string::npos)
       << Refusal(rows);
   Write("poses_times.txt", "5\n5\n");
@@ -129,21 +129,22 @@ TEST_F(TrajectoryFiles, AGivenFormatOverridesTheRow) {
   EXPECT_EQ(t.timestamps[0], 1'500'000'000);
   EXPECT_EQ(t.orientations[0].w(), 1.0);
   EXPECT_EQ(Refusal("0 1 2 3 0 0 0 1\n", TrajectoryFormat::kKitti),
-            "poses.txt:1:16: 8 columns; expected 12, the upper three rows of world_from_body");
+            "poses.txt:1:16: the row has 8 columns; expected 12, the upper three rows of "
+            "world_from_body");
 }
 
 TEST_F(TrajectoryFiles, RowsThatAreNoneAreRefusedWithTheirPlace) {
   const std::string good = "0 1 2 3 0 0 0 1\n";
   EXPECT_EQ(Refusal("1 2 3\n"),
-            "poses.txt:1: 3 columns; expected 8 columns (TUM), 20 (TUM with covariances), 12 "
-            "(KITTI), or with commas 8 or 17 (EuRoC)");
+            "poses.txt:1: the row has 3 columns; expected 8 columns (TUM), 20 columns (TUM with "
+            "covariances), 12 columns (KITTI), or 8 or 17 columns separated by commas (EuRoC)");
   EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0\n"),
-            "poses.txt:2:14: 7 columns; expected 8, t x y z qx qy qz qw");
+            "poses.txt:2:14: the row has 7 columns; expected 8, t x y z qx qy qz qw");
   EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0"),
-            "poses.txt:2:14: the last line is cut short: 7 columns; expected 8, t x y z qx qy qz "
-            "qw");
+            "poses.txt:2:14: the last line is cut short: it has 7 columns; expected 8, t x y z qx "
+            "qy qz qw");
   EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0 1 5\n"),
-            "poses.txt:2:17: 9 columns; expected 8, t x y z qx qy qz qw");
+            "poses.txt:2:17: the row has 9 columns; expected 8, t x y z qx qy qz qw");
   EXPECT_EQ(Refusal(good + "1 1 nan 3 0 0 0 1\n"),
             "poses.txt:2:5 y: 'nan' is not finite; expected a finite number");
   EXPECT_EQ(Refusal(good + "1 1 -1e300 3 0 0 0 1\n"),
@@ -151,15 +152,16 @@ TEST_F(TrajectoryFiles, RowsThatAreNoneAreRefusedWithTheirPlace) {
   EXPECT_EQ(Refusal(good + "1 1 2.x 3 0 0 0 1\n"),
             "poses.txt:2:5 y: '2.x' is not a number; expected a finite number");
   EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0 1.01\n"),
-            "poses.txt:2: quaternion of length 1.010000; expected a length within 1e-3 of 1");
+            "poses.txt:2: the length of the quaternion is 1.010000; expected a length within "
+            "1e-3 of 1");
   EXPECT_EQ(Refusal("1.5,1,2,3,1,0,0,0\n"),
             "poses.txt:1:1 t: '1.5' is not a whole number; expected a whole number of 0 or more");
   const std::string no_rotation =
-      "poses.txt:1: columns 1-3, 5-7, 9-11 are not a rotation; expected R R' = 1 to 1e-3, det R = "
-      "1";
+      "poses.txt:1: columns 1-3, 5-7, 9-11 are not a rotation matrix; expected R with R R' = 1 to "
+      "within 1e-3, and det R = 1";
   EXPECT_EQ(Refusal("1.1 0 0 0 0 1 0 0 0 0 1 0\n"), no_rotation);
   EXPECT_EQ(Refusal("-1 0 0 0 0 1 0 0 0 0 1 0\n"), no_rotation);
-  EXPECT_EQ(Refusal("# nothing\n").substr(0, 23), "poses.txt:1: no poses; ");
+  EXPECT_EQ(Refusal("# nothing\n").substr(0, 40), "poses.txt:1: the file contains no poses;");
   EXPECT_THROW(ReadTrajectory(folder_ / "missing.txt"), Error);
 }
 
@@ -179,15 +181,15 @@ TEST_F(TrajectoryFiles, TimestampsThatCannotBeSecondsAreReadAsWhatTheyLookLike) 
     const std::string text = "# t\n" + c.first + pose + c.second + pose;
     EXPECT_EQ(WarningsOf(text),
               "poses.txt:2 t: '" + c.first +
-                  "' and the following timestamps are not plausible as seconds; read as " + c.unit +
-                  "; expected seconds, as in TUM\n");
+                  "' and the following timestamps are not plausible as seconds; they are read as " +
+                  c.unit + "; expected seconds, as in TUM\n");
     const Trajectory t = Read(text);
     EXPECT_NEAR(1e-9 * static_cast<double>(t.timestamps[1] - t.timestamps[0]), 0.0333, 1e-4);
   }
-  // Timestamps in us, one pose every second.
+  // The timestamps are in us, with one pose per second.
   EXPECT_EQ(Read("0" + pose + "1000000" + pose).timestamps[1], 1'000'000'000);
   EXPECT_EQ(Read("1311868163869" + pose + "1311868168869" + pose).timestamps[1],
-            1'311'868'168'869'000'000);  // in ms, 5 s apart
+            1'311'868'168'869'000'000);  // the timestamps are in ms, 5 s apart
   EXPECT_EQ(Read("1311868163869700001" + pose).timestamps[0], 1311868163869700001);
   EXPECT_EQ(WarningsOf("1311868163.8697" + pose + "1311868200" + pose), "");
 }
@@ -230,8 +232,8 @@ TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
   EXPECT_EQ(refusal("-1e-9 0 0 -1e-9 0 -1e-9", good),
             "poses.txt:2: the covariance of the orientation" + none +
                 "1e-09; expected a positive semi-definite matrix");
-  // A singular covariance is valid. So is a covariance that is negative only because it was rounded
-  // to six digits.
+  // A singular covariance is valid. A covariance that is negative only because it was rounded to
+  // six digits is also valid.
   EXPECT_EQ(refusal("0 0 0 0 0 0", "1 1 0 1 0 0"), "");
   EXPECT_EQ(refusal(good, "0.111111 0.111112 0 0.111111 0 1"), "");
 }
@@ -239,9 +241,8 @@ TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
 TEST_F(TrajectoryFiles, TimestampsOutOfOrderAreSortedAndToldOf) {
   const std::string text = "1 1 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n4 4 0 0 0 0 0 1\n";
   EXPECT_EQ(WarningsOf(text),
-            "poses.txt:3 t: is earlier than the previous timestamp: 2.000000 s; expected poses in "
-            "the order of their timestamps; "
-            "they are sorted\n");
+            "poses.txt:3 t: 2.000000 s is earlier than the previous timestamp; expected poses in "
+            "the order of their timestamps; the poses are sorted\n");
   const Trajectory t = Read(text);
   EXPECT_EQ(t.positions.row(0), Eigen::RowVector4d(1, 2, 3, 4));
   EXPECT_TRUE(std::ranges::is_sorted(t.timestamps));
@@ -250,18 +251,16 @@ TEST_F(TrajectoryFiles, TimestampsOutOfOrderAreSortedAndToldOf) {
 TEST_F(TrajectoryFiles, PosesOfADuplicateTimestampAreAllKeptAndItsLineIsNamed) {
   const std::string text = "1 1 0 0 0 0 0 1\n1 9 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n";
   EXPECT_EQ(WarningsOf(text),
-            "poses.txt:2 t: duplicate timestamp 1.000000 s, the first of 2 duplicate timestamps; "
-            "expected "
-            "each timestamp once; all poses are kept\n");
+            "poses.txt:2 t: 1.000000 s is a duplicate timestamp, the first of 2 duplicate "
+            "timestamps; expected each timestamp once; all poses are retained\n");
   EXPECT_EQ(Read(text).positions.row(0), Eigen::RowVector4d(1, 9, 2, 9));
   EXPECT_EQ(Read(text).timestamps.size(), 4u);
   // Sorting keeps the order of poses that have equal timestamps.
   EXPECT_EQ(WarningsOf("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n"),
-            "poses.txt:2 t: is earlier than the previous timestamp: 1.000000 s; expected poses in "
-            "the order of their timestamps; "
-            "they are sorted\n"
-            "poses.txt:3 t: duplicate timestamp 2.000000 s; expected each timestamp once; all "
-            "poses are kept\n");
+            "poses.txt:2 t: 1.000000 s is earlier than the previous timestamp; expected poses in "
+            "the order of their timestamps; the poses are sorted\n"
+            "poses.txt:3 t: 2.000000 s is a duplicate timestamp; expected each timestamp once; all "
+            "poses are retained\n");
   EXPECT_EQ(Read("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n").positions.row(0),
             Eigen::RowVector3d(1, 2, 9));
 }
@@ -275,8 +274,8 @@ TEST_F(TrajectoryFiles, AFirstPoseThatIsTheIdentityInTheOtherOrderIsToldOf) {
             "poses.txt:1 qw: the first pose is the identity if the quaternion is read with w last; "
             "expected qw qx qy qz, as in EuRoC\n");
   EXPECT_EQ(WarningsOf("0 0 0 0 0 0 0 1\n"), "");
-  // This first pose has a rotation of 180 degrees, but it is not at the origin, so there is no
-  // warning.
+  // The first pose has a rotation of 180 degrees, but its position is not the origin, so there is
+  // no warning.
   EXPECT_EQ(WarningsOf("0 0.1 0 0 1 0 0 0\n"), "");
 }
 
@@ -320,7 +319,7 @@ TEST_F(TrajectoryFiles, TheTruthOfARunIsInItsFolderOrInThatOfItsEstimator) {
       FAIL() << name;
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ExitCode::kInputMissing);
-      EXPECT_NE(std::string(error.what()).find("no truth.tum in this run"), std::string::npos)
+      EXPECT_NE(std::string(error.what()).find("run does not contain truth.tum"), std::string::npos)
           << error.what();
     }
   }

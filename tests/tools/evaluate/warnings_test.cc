@@ -14,7 +14,7 @@ using testing::Curve;
 using testing::Inverse;
 using testing::Turn;
 
-/// Returns the warnings, one in each line.
+/// Returns the warnings, one warning per line.
 std::string WarningsOf(const Trajectory& reference, const Trajectory& estimate,
                        const EvaluateOptions& options = {}) {
   std::string all;
@@ -57,9 +57,11 @@ TEST(EvaluationWarnings, AScaleFarFromOneIsNoMetricScale) {
   known.scale = 2.228;
   const Trajectory mono = Estimate(Inverse(known) * Curve(60));
   const std::string warnings = WarningsOf(Curve(60), mono, Aligned(Alignment::kSe3));
-  EXPECT_TRUE(warnings.starts_with("estimate.tum: scale 2.228 (error 0.0")) << warnings;
+  EXPECT_TRUE(warnings.starts_with("estimate.tum: the scale is 2.228 (the error is 0.0"))
+      << warnings;
   EXPECT_TRUE(
-      warnings.ends_with("m with se3): probably a run without metric scale; expected -as\n"))
+      warnings.ends_with("m with se3): the estimate probably has no metric scale; expected the "
+                         "option -as, which aligns with scale\n"))
       << warnings;
   EXPECT_EQ(WarningsOf(Curve(60), mono, Aligned(Alignment::kSim3)), "");
 }
@@ -69,7 +71,8 @@ TEST(EvaluationWarnings, AnErrorThatAlignmentTakesAwayIsOfAnotherWorld) {
   const Trajectory estimate = Estimate(Inverse(known) * Curve(60));
   const std::string warnings = WarningsOf(Curve(60), estimate);
   EXPECT_TRUE(warnings.starts_with("estimate.tum: the error is ")) << warnings;
-  EXPECT_TRUE(warnings.ends_with("with se3: probably another world frame; expected --align\n"))
+  EXPECT_TRUE(warnings.ends_with(
+      "with se3: the world frames probably differ; expected the option --align\n"))
       << warnings;
   EXPECT_EQ(WarningsOf(Curve(60), estimate, Aligned(Alignment::kSe3)), "");
 }
@@ -87,9 +90,8 @@ TEST(EvaluationWarnings, AConstantTimeOffsetIsToldWithTheOptionThatTakesIt) {
   Trajectory estimate = Estimate(Curve(60));
   for (Timestamp& timestamp : estimate.timestamps) timestamp += 8'000'000;
   EXPECT_EQ(WarningsOf(Curve(60), estimate),
-            "estimate.tum: in the median, the timestamps are 0.008 s after those of the reference; "
-            "expected "
-            "--t-offset -0.008\n");
+            "estimate.tum: the timestamps are 0.008 s after those of the reference (median "
+            "difference); expected the option --t-offset -0.008\n");
   EvaluateOptions options;
   options.offset = -8'000'000;
   EXPECT_EQ(WarningsOf(Curve(60), estimate, options), "");
@@ -114,9 +116,8 @@ TEST(EvaluationWarnings, OrientationsTurnedAllAlikeAreOfAnotherBody) {
       warnings.starts_with("estimate.tum: all orientations differ by the same rotation of 85."))
       << warnings;
   EXPECT_TRUE(
-      warnings.ends_with("deg: probably another body frame; "
-                         "expected poses of the same body frame; the positions may also be "
-                         "those of another point\n"))
+      warnings.ends_with("deg: the body frames probably differ; expected poses of the same body "
+                         "frame; the positions may also belong to different points\n"))
       << warnings;
 }
 
@@ -125,9 +126,8 @@ TEST(EvaluationWarnings, PositionsOnALineDetermineNoTurnAboutIt) {
   estimate.positions.row(1) = 1e-4 * estimate.positions.row(0).array().sin();
   estimate.name = "estimate.tum";
   EXPECT_EQ(WarningsOf(testing::Line(60, 0.5), estimate, Aligned(Alignment::kSe3)),
-            "estimate.tum: positions of the estimate or the reference are collinear: the rotation "
-            "of se3 about the line is arbitrary, so orientation errors are arbitrary as well; "
-            "expected no "
+            "estimate.tum: the positions of the estimate or the reference are collinear: the "
+            "rotation of se3 about the line and the orientation errors are arbitrary; expected no "
             "alignment, --align-origin or --align-mode yaw for orientation errors\n");
   EXPECT_EQ(WarningsOf(testing::Line(60, 0.5), estimate, Aligned(Alignment::kYaw)), "");
 }
@@ -142,8 +142,9 @@ TEST(EvaluationWarnings, QuaternionsInTheOtherOrderAreToldOfWithTheirFile) {
   swapped.first_line = 7;
   std::string warnings = WarningsOf(Curve(60), swapped);
   EXPECT_TRUE(warnings.starts_with("estimate.tum:7: the orientations agree to 0.")) << warnings;
-  EXPECT_NE(warnings.find(" deg if quaternions are read with w first, and to "), std::string::npos);
-  EXPECT_TRUE(warnings.ends_with(" deg as read; expected qx qy qz qw\n")) << warnings;
+  EXPECT_NE(warnings.find(" deg if quaternions are read with w first, but only to "),
+            std::string::npos);
+  EXPECT_TRUE(warnings.ends_with(" deg with w last; expected qx qy qz qw\n")) << warnings;
   // The same warning is given for the reference.
   swapped.name = "reference.tum";
   warnings = WarningsOf(swapped, Curve(60));
@@ -154,7 +155,7 @@ TEST(EvaluationWarnings, QuaternionsInTheOtherOrderAreToldOfWithTheirFile) {
   }
   estimate.format = TrajectoryFormat::kEuroc;
   warnings = WarningsOf(Curve(60), estimate);
-  EXPECT_NE(warnings.find("are read with w last, and to "), std::string::npos) << warnings;
+  EXPECT_NE(warnings.find("are read with w last, but only to "), std::string::npos) << warnings;
   EXPECT_TRUE(warnings.ends_with("expected qw qx qy qz\n")) << warnings;
 }
 
@@ -177,13 +178,13 @@ TEST(EvaluationWarnings, ASwapOfReferenceAndEstimateIsSeenByTheirNames) {
     Trajectory reference = Curve(60), estimate = Estimate(Curve(60));
     reference.name = c.reference;
     estimate.name = c.estimate;
-    EXPECT_EQ(
-        WarningsOf(reference, estimate),
-        c.swapped
-            ? std::string(c.estimate) +
-                  ": is named like ground truth, but is used as the estimate; the reference is " +
-                  c.reference + "; expected REF first, then EST\n"
-            : "");
+    EXPECT_EQ(WarningsOf(reference, estimate),
+              c.swapped
+                  ? std::string(c.estimate) +
+                        ": the file is named like ground truth, but is used as the estimate; the "
+                        "reference is " +
+                        c.reference + "; expected REF first, then EST\n"
+                  : "");
   }
 }
 
@@ -192,8 +193,8 @@ TEST(EvaluationWarnings, ASwapOfReferenceAndEstimateIsSeenByTheCovariances) {
   with.position_covariances.assign(60, Eigen::Matrix3d::Identity());
   with.orientation_covariances = with.position_covariances;
   EXPECT_EQ(WarningsOf(with, Curve(60)),
-            "estimate.tum: has covariances, as an estimate does, but curve.tum has none; expected "
-            "REF first, then EST\n");
+            "estimate.tum: the reference has covariances, as an estimate does, but the estimate "
+            "curve.tum does not have covariances; expected REF first, then EST\n");
   EXPECT_EQ(WarningsOf(Curve(60), with), "");
   EXPECT_EQ(WarningsOf(with, with), "");
 }

@@ -50,7 +50,7 @@ TEST(DataHash, IsOfContentNotOfItsOrderOrSign) {
   SourceFrame turned = MakeFrame();
   std::swap(turned.measurements[0], turned.measurements[1]);
   EXPECT_EQ(HashOf({MakeFrame()}).measurements(), HashOf({turned}).measurements());
-  // Another source has the same streams in a different order.
+  // The other source has the same streams in a different order.
   SourceFrame other = MakeFrame();
   other.measurements[0].stream = 1;
   other.measurements[1].stream = 0;

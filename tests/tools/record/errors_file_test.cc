@@ -14,8 +14,8 @@
 namespace alidade::testing {
 namespace {
 
-/// A camera with an estimated position and orientation and a known heading. It also has a bias,
-/// which has no truth.
+/// A camera with an estimated position and orientation and a known heading. The camera also has a
+/// bias without truth.
 class ErrorsOfACamera : public ::testing::Test {
  protected:
   ErrorsOfACamera() {
@@ -64,7 +64,7 @@ TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
   internal::OutputFolder out(folder / "out", false);
   internal::RunColumns columns;
   internal::ErrorsFile file(out, "ekf", Layouts({0, 1, 2, -1}), columns);
-  Add(file);  // so far no block has a value
+  Add(file);  // no block has a value yet
   EXPECT_FALSE(file.elements()[0].is_known);
   AddBlocks();
   Add(file);
@@ -80,9 +80,9 @@ TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
   EXPECT_EQ(lines[1], "0.500000000,,,,,,,,,,,,");
   const std::vector<std::string> cells = Cells(lines[2]);
   ASSERT_EQ(cells.size(), 13u);
-  EXPECT_EQ(cells[1] + ' ' + cells[2], "0.25 -0.5");  // in m
+  EXPECT_EQ(cells[1] + ' ' + cells[2], "0.25 -0.5");  // the errors are in m
   EXPECT_EQ(cells[3] + ' ' + cells[4], "0.5 2");
-  EXPECT_NEAR(std::stod(cells[5]), 0.2, 1e-12);  // in rad, in the frame of the body
+  EXPECT_NEAR(std::stod(cells[5]), 0.2, 1e-12);  // the error is in rad and in the frame of the body
   EXPECT_EQ(cells[6] + cells[7], "00");
   EXPECT_EQ(cells[9], "0.01");
   // The error is wrapped to (-pi, pi].

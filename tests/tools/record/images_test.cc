@@ -18,8 +18,8 @@ TEST(Images, ABuildWithoutThePluginSaysWhatToInstall) {
   } catch (const Error& e) {
     const std::string text = e.what();
     EXPECT_EQ(e.code(), ExitCode::kPlugin);
-    EXPECT_EQ(text.find("v.avi: this build of alidade does not include images; expected a build "
-                        "with OpenCV: apt-get install libopencv-dev"),
+    EXPECT_EQ(text.find("v.avi: this build of alidade cannot write images; expected a build with "
+                        "OpenCV: run 'apt-get install libopencv-dev'"),
               0u)
         << text;
     EXPECT_NE(text.find("searched /nonexistent"), std::string::npos);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests the files of a run that contain landmarks.
+// Tests those files of a run that contain landmarks.
 #include "alidade/record/landmarks_file.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ namespace {
 /// A camera moves to the right past four points. A sensor measures the offsets of the points.
 class Street : public Source {
  public:
-  /// If `outlier`, one measurement of landmark 3 has a large error.
+  /// If `outlier` is true, one measurement of landmark 3 has a large error.
   explicit Street(bool outlier = false) : outlier_(outlier) {}
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
@@ -158,8 +158,8 @@ TEST(LandmarkRecords, TheMapHasThoseThatWereRemoved) {
   EXPECT_EQ(before[15], "1");  // x of its true position
   EXPECT_EQ(after[0] + after[1] + after[21] + ' ' + after[22], "01kept ");
   EXPECT_EQ(after[11], "1.100000000");
-  // The metrics of the map contain only the landmarks at the end. The same holds for the map that a
-  // reader of the folder gets.
+  // The metrics of the map contain only the landmarks at the end. A reader of the folder obtains
+  // the same map.
   const EstimatorResult& one = result.estimators.at(0);
   ASSERT_EQ(one.landmarks->size(), 4u);
   ASSERT_EQ(one.removed_landmarks.size(), 1u);
@@ -196,7 +196,7 @@ TEST(LandmarkRecords, PointsOfTheMapAreWrittenAsPly) {
 }
 
 // If a landmark was seen along one ray only, its distance is unknown. The inverse distance is then
-// written in cells of its own.
+// written in separate cells.
 TEST(LandmarkRecords, AnInverseDistanceIsWrittenBeforeItsSigma) {
   LandmarkEstimate far_off;
   far_off.id = 7;
@@ -263,7 +263,7 @@ TEST(LandmarkRecords, TheReprojectionErrorOfEachFrameIsWritten) {
   }
   const std::vector<std::string> lines = Lines(folder / "out/ekf/reprojection.csv");
   EXPECT_EQ(lines[0], "t_s,sensor,landmarks,rms");
-  // The header and 19 frames; the first frame only initialises the landmarks.
+  // The file contains the header and 19 frames. The first frame only initialises the landmarks.
   EXPECT_EQ(lines.size(), 20u);
   const std::vector<std::string> last = Cells(lines.back());
   EXPECT_EQ(last[0] + last[1] + last[2], "1.900000000tracks4");

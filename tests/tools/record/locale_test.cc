@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Fault 98 of tests/faults/README.md: a locale that writes numbers with a comma has no effect.
+// Tests fault 98 of tests/faults/README.md: a locale that writes numbers with a comma has no
+// effect.
 #include <cstdio>
 
 #include "alidade/replay/replay.h"
@@ -38,7 +39,7 @@ TEST(CommaLocale, ChangesNoByteOfWhatIsWritten) {
   RecordAll(folder / "plain");
   {
     const CommaLocale comma;
-    if (!comma.active()) GTEST_SKIP() << "localedef is not here";
+    if (!comma.active()) GTEST_SKIP() << "localedef is not available";
     char text[16];
     std::snprintf(text, sizeof text, "%.1f", 0.5);
     ASSERT_STREQ(text, "0,5");
@@ -66,12 +67,12 @@ std::string ReasonOfAFailure() {
 
 TEST(CommaLocale, ChangesNoMessage) {
   const std::string plain = ReasonOfAFailure();
-  EXPECT_NE(plain.find(" s would need more than 1e+06 steps of 1.5e-09 s; last good state at "
-                       "0.000000 s: target.depth = 0."),
+  EXPECT_NE(plain.find(" s would need more than 1e+06 steps of 1.5e-09 s; increase max_dt_s; last "
+                       "good state at 0.000000 s: target.depth = 0."),
             std::string::npos)
       << plain;
   const CommaLocale comma;
-  if (!comma.active()) GTEST_SKIP() << "localedef is not here";
+  if (!comma.active()) GTEST_SKIP() << "localedef is not available";
   EXPECT_EQ(ReasonOfAFailure(), plain);
 }
 

@@ -22,7 +22,7 @@ std::string LogOf(const std::filesystem::path& folder) {
   return text.str();
 }
 
-/// Collects the warnings that are logged during its lifetime.
+/// Collects the warnings that are logged during the lifetime of this object.
 struct Warnings {
   std::vector<std::string> texts;
   LogSubscription sink{LogLevel::kWarning,

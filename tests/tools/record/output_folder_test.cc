@@ -27,7 +27,7 @@ std::vector<std::string> EntriesOf(const fs::path& folder) {
   return entries;
 }
 
-/// Leaves a partial folder as a process does that is killed after it has written a file.
+/// Leaves a partial folder, like a process that is killed after it has written a file.
 void LeavePartial(const fs::path& target, const std::string& text = "rows\n") {
   OutputFolder folder(target, false);
   folder.Write("ekf/a.csv", text);
@@ -62,7 +62,7 @@ TEST(OutputFolder, StaysPartialOnlyIfItIsToBeKept) {
   EXPECT_EQ(Read(temporary / "out.partial/ekf/a.csv"), "rows\n");
 }
 
-// Fault 92 of tests/faults/README.md.
+// Tests fault 92 of tests/faults/README.md.
 TEST(OutputFolder, LeavesAnExistingFolderAlone) {
   const TemporaryFolder temporary;
   const fs::path out = temporary / "out";
@@ -74,7 +74,7 @@ TEST(OutputFolder, LeavesAnExistingFolderAlone) {
   EXPECT_EQ(Read(out / "ekf/a.csv"), "old\n");
 }
 
-// Faults 91 and 92 of tests/faults/README.md.
+// Tests faults 91 and 92 of tests/faults/README.md.
 TEST(OutputFolder, LeavesAnExistingPartialFolderAlone) {
   const TemporaryFolder temporary;
   const fs::path out = temporary / "out";
@@ -82,8 +82,8 @@ TEST(OutputFolder, LeavesAnExistingPartialFolderAlone) {
   std::string text;
   EXPECT_EQ(CodeOf([&] { OutputFolder(out, false); }, &text), 73);
   EXPECT_EQ(text, (temporary / "out.partial").string() +
-                      ": exists already: the command that writes it has ended early or is still "
-                      "running; add --force to replace it, or remove it");
+                      ": exists already: another command ended before it completed this folder, "
+                      "or is still running; add --force to replace this folder, or remove it");
   EXPECT_EQ(Read(temporary / "out.partial/ekf/a.csv"), "rows\n");
   Complete(out, true, "new\n");
   EXPECT_EQ(Read(out / "ekf/a.csv"), "new\n");
@@ -97,7 +97,8 @@ TEST(OutputFolder, IsContinuedIfAsked) {
     OutputFolder folder(temporary / "out", false, true);
     folder.Append("ekf/a.csv")->Write("more\n");
   }
-  EXPECT_EQ(Read(temporary / "out.partial/ekf/a.csv"), "rows\nmore\n") << "it stays";
+  EXPECT_EQ(Read(temporary / "out.partial/ekf/a.csv"), "rows\nmore\n")
+      << "the existing file must not change";
   OutputFolder(temporary / "out", false, true).Commit();
   EXPECT_EQ(Lines(temporary / "out/files.txt"), EntriesOf(temporary / "out"));
 }
@@ -185,7 +186,8 @@ TEST(OutputFolder, ForceSparesWhatIsNoRunFolder) {
   }
   EXPECT_EQ(Read(temporary / "home.partial/thesis.tex"), "x");
   fs::remove(temporary / "home.partial/thesis.tex");
-  EXPECT_EQ(CodeOf([&] { OutputFolder(temporary / "home", true); }), 0) << "it is empty";
+  EXPECT_EQ(CodeOf([&] { OutputFolder(temporary / "home", true); }), 0)
+      << "an empty partial folder is replaced";
 }
 
 // Files that other writers added, such as images and figures, also belong to the folder.
@@ -223,13 +225,13 @@ TEST(OutputFolder, NeedsAName) {
   for (const char* name : {"", "/"}) {
     std::string text;
     EXPECT_EQ(CodeOf([&] { OutputFolder(name, true); }, &text), 73);
-    EXPECT_TRUE(text.ends_with("is not a name for a folder; expected PATH/NAME")) << text;
+    EXPECT_TRUE(text.ends_with("is not a valid folder name; expected PATH/NAME")) << text;
   }
   EXPECT_EQ(internal::PartialOf("."), fs::current_path().string() + ".partial");
   EXPECT_EQ(internal::PartialOf("a/../b/"), "b.partial");
 }
 
-// Fault 93 of tests/faults/README.md.
+// Tests fault 93 of tests/faults/README.md.
 TEST(OutputFolder, AFolderThatCannotBeWrittenToIsRefused) {
   const TemporaryFolder temporary;
   fs::create_directories(temporary / "mine");
@@ -239,12 +241,12 @@ TEST(OutputFolder, AFolderThatCannotBeWrittenToIsRefused) {
     if (::getuid() == 0 && ::setuid(65534) != 0) ::_exit(99);
     OutputFolder(temporary / "mine/deep/out", false);
   });
-  if (code == 99) GTEST_SKIP() << "cannot give up the rights of root";
+  if (code == 99) GTEST_SKIP() << "this process cannot drop the privileges of root";
   EXPECT_EQ(code, 73);
   EXPECT_TRUE(fs::is_empty(temporary / "mine"));
 }
 
-// Fault 87 of tests/faults/README.md.
+// Tests fault 87 of tests/faults/README.md.
 TEST(OutputFile, TakesNoMoreAfterAFailure) {
   OutputFile file("/dev/full");
   file.Write("1\n");
@@ -255,7 +257,7 @@ TEST(OutputFile, TakesNoMoreAfterAFailure) {
   EXPECT_EQ(text, "/dev/full: cannot write: No space left on device");
 }
 
-// Fault 87 of tests/faults/README.md: a full disk or quota is not reported as an error of
+// Tests fault 87 of tests/faults/README.md: a full disk or quota is not reported as an error of
 // permissions.
 TEST(OutputFile, WhatCannotBeCreatedHasTheCodeOfItsCause) {
   for (const auto& [error, code] :
@@ -275,7 +277,7 @@ TEST(Recorder, SaysThatItIsRunning) {
   EXPECT_NE(ok.find("\"status\": \"ok\""), ok.npos) << ok;
 }
 
-// Fault 87 of tests/faults/README.md: only one of the files is on a full disk.
+// Tests fault 87 of tests/faults/README.md: only one of the files is on a full disk.
 TEST(Recorder, AFullDiskKeepsTheRows) {
   const TemporaryFolder temporary;
   const fs::path partial = temporary / "out.partial";

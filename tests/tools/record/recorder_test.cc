@@ -246,7 +246,7 @@ TEST(Recorder, QuotesTextsInEvents) {
   Record(OptionsFor(folder / "out"));
   // The measurements vary less than the filter assumes.
   const std::string events = Read(folder / "out/ekf/events.csv");
-  EXPECT_TRUE(events.starts_with("t_s,kind,text\n,nis_bounds,\"NIS mean 0.")) << events;
+  EXPECT_TRUE(events.starts_with("t_s,kind,text\n,nis_bounds,\"the mean NIS of sensor ")) << events;
   EXPECT_TRUE(
       events.ends_with("\n0.033000000,estimator_specific,\"a \"\"word\"\", "
                        "and\nanother\"\n,estimator_specific,timeless\n"))

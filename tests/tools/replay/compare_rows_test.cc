@@ -35,7 +35,7 @@ TEST(CompareRows, KnowsAnEmptyCellAndWhatIsNoText) {
   EXPECT_EQ(empty->Text(), "now '2', was ''");
   const auto bytes = Compare("\x01\x02\n", "\x01\x03\n").difference;
   ASSERT_TRUE(bytes);
-  EXPECT_EQ(bytes->Text(), "other bytes");
+  EXPECT_EQ(bytes->Text(), "the bytes differ");
 }
 
 TEST(CompareRows, SaysWhichGoesOn) {
@@ -54,8 +54,8 @@ TEST(CompareRows, SaysWhichGoesOn) {
 TEST(CompareRows, ARowWithoutItsLineEndCounts) {
   const auto end = Compare("1\n2", "1\n2\n").difference;
   ASSERT_TRUE(end);
-  EXPECT_EQ(end->Text(), "line end");
-  EXPECT_EQ(Compare("1,\n", "1,").difference->Text(), "line end");
+  EXPECT_EQ(end->Text(), "the line end differs");
+  EXPECT_EQ(Compare("1,\n", "1,").difference->Text(), "the line end differs");
   EXPECT_EQ(Compare("12\n", "1").difference->Text(), "now '1', was '12'");
   EXPECT_TRUE(Compare("1\n2", "1\n23\n").difference);
 }
@@ -69,7 +69,7 @@ TEST(CompareRows, AFileThatIsNotThereHasNoRowsAndOneThatCannotBeReadIsAnError) {
   EXPECT_FALSE(missing.difference);
   try {
     CompareRows(folder.path(), file);
-    ADD_FAILURE() << "a folder has no rows";
+    ADD_FAILURE() << "no error; expected an error, because a folder has no rows";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::kIo);
     EXPECT_TRUE(std::string(error.what()).starts_with(folder.path().string())) << error.what();

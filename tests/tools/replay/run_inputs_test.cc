@@ -53,7 +53,7 @@ TEST(RunInputs, NameWhatDiffers) {
   EXPECT_EQ(Differences(before, InputsOf(data, {plugin})),
             (std::vector<std::string>{"plugin own.so: now 3fc4ccfe7458..., was 7692c3ad3540..."}));
   EXPECT_EQ(Differences(before, InputsOf(data)),
-            (std::vector<std::string>{"plugin own.so: missing now"}));
+            (std::vector<std::string>{"plugin own.so: this input is missing now"}));
   Written(folder / "own.so", "one");
   Written(folder / "a.csv", "2\n");
   const auto other = Differences(before, InputsOf(data, {plugin}));
@@ -73,8 +73,9 @@ TEST(RunInputs, AFolderOfDataStandsForItsFiles) {
   Written(data / "deeper/b.csv", "1\n");
   EXPECT_EQ(Differences(before, InputsOf(data.string())), std::vector<std::string>{});
   Written(data / "truth.tum", "1\n");
-  EXPECT_EQ(Differences(before, InputsOf(data.string())),
-            (std::vector<std::string>{"data " + (data / "truth.tum").string() + ": new"}));
+  EXPECT_EQ(
+      Differences(before, InputsOf(data.string())),
+      (std::vector<std::string>{"data " + (data / "truth.tum").string() + ": this input is new"}));
 }
 
 TEST(RunInputs, HaveTheDataOfAllRunsOnce) {
@@ -96,7 +97,7 @@ TEST(RunInputs, AFileThatCannotBeReadIsAnError) {
   const testing::TemporaryFolder folder;
   std::string text;
   EXPECT_EQ(testing::CodeOf([&] { HashFiles({folder / "none.so"}); }, &text), 74);
-  EXPECT_EQ(text, (folder / "none.so").string() + ": cannot be read to compute its hash");
+  EXPECT_EQ(text, (folder / "none.so").string() + ": the file cannot be read to compute its hash");
 }
 
 TEST(FindUsedPlugins, AreThoseOfModelsAndTypesAtAnyDepth) {

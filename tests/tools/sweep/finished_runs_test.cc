@@ -47,7 +47,8 @@ TEST(FinishedRuns, AreReadAsTheyWereWritten) {
     FinishedRuns runs(first);
     runs.Add("x=1", MakeRun(std::numeric_limits<std::uint64_t>::max()));
   }
-  ASSERT_TRUE(std::filesystem::exists(temporary / "out.partial")) << "it is kept";
+  ASSERT_TRUE(std::filesystem::exists(temporary / "out.partial"))
+      << "the partial folder must be kept";
   OutputFolder second(temporary / "out", false, true);
   const FinishedRuns runs(second);
   EXPECT_EQ(runs.size(), 1u);
@@ -102,7 +103,8 @@ TEST(FinishedRuns, OfSeveralThreadsAreAllWritten) {
   for (std::string line; std::getline(stream, line);) {
     const std::optional<ParsedRunLine> read = ReadRunLine(line);
     ASSERT_TRUE(read) << line;
-    EXPECT_TRUE(seeds.insert(read->run.seed).second) << "twice: " << read->run.seed;
+    EXPECT_TRUE(seeds.insert(read->run.seed).second)
+        << "this seed occurs twice: " << read->run.seed;
   }
   EXPECT_EQ(seeds.size(), kThreads * kRuns);
 }

@@ -25,7 +25,8 @@ SweepRun RunWithErrors(std::vector<double> rms, bool diverged = false) {
 VariedSweep SweepOfTwoLevels() {
   VariedSweep sweep{{"source.sigma_px", {"0.5", "2"}}, {}};
   sweep.results.resize(2);
-  // Errors in px. The mean of a frame uses the runs that have this frame and did not diverge.
+  // The errors are in px. The mean of a frame uses the runs that have this frame and did not
+  // diverge.
   sweep.results[0].done = {RunWithErrors({1.0, kNone, 0.25}), RunWithErrors({2.0, kNone}),
                            RunWithErrors({100.0, 100.0, 100.0}, true)};
   sweep.results[1].done = {RunWithErrors({4.0})};

@@ -15,7 +15,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(Quantile, IsLinearBetweenOrderStatistics) {
-  // The expected values are those of numpy.quantile([1, 2, 4, 8], q): h = 3 q.
+  // The expected values are those of numpy.quantile([1, 2, 4, 8], q), which interpolates at the
+  // index 3 q.
   const std::vector<double> x = {1, 2, 4, 8};
   EXPECT_DOUBLE_EQ(Quantile(x, 0.0), 1.0);
   EXPECT_DOUBLE_EQ(Quantile(x, 0.05), 1.15);
@@ -54,8 +55,8 @@ SweepRow Result(double rmse, bool diverged = false, bool inconsistent = false) {
   return Add(one, {{"rmse:x", rmse}});
 }
 
-/// Returns six runs. Three of them count, one of which is inconsistent. Two runs diverged, and one
-/// inconsistent run failed.
+/// Returns six runs. Three of the runs count, and one of these three is inconsistent. Two runs
+/// diverged, and one inconsistent run failed.
 SweepResult SixRuns() {
   SweepResult result;
   result.runs = 6;
@@ -88,7 +89,7 @@ TEST(Summarise, LeavesOutWhatIsNotANumber) {
   SweepRow& first = result.done[0].estimators[0];
   first = Add(first, {{"rmse:x", std::numeric_limits<double>::quiet_NaN()}});
   SweepRow& second = result.done[1].estimators[0];
-  // A metric of one run only, whose key comes before those of the other runs.
+  // This metric exists in one run only. Its key comes before the keys of the other runs.
   second = Add(second, {{"rmse:a", 7.0}});
   const std::vector<SweepSummary> summaries = Summarise(result);
   EXPECT_FALSE(summaries[0].metrics.contains("rmse:never"));
@@ -167,11 +168,11 @@ TEST(SweepTable, ReportsAMeanNeesOutsideItsBounds) {
   for (SweepRun& run : result.done) {
     run.estimators[0] = Add(run.estimators[0], {{"nees.mean:x", 4.0}, {"nees.dof:x", 2.0}});
   }
-  // Three runs have two degrees of freedom each: chi2(0.025; 6) / 6 = 0.2062, chi2(0.975; 6) / 6
-  // = 2.408.
+  // Three runs have two degrees of freedom each: chi2(0.025; 6) / 6 = 0.2062 and
+  // chi2(0.975; 6) / 6 = 2.408.
   const std::string line =
-      "\nekf: NEES mean 4 of x over 3 runs is outside its 95 % bounds [0.206, 2.41]: the filter is "
-      "overconfident\n";
+      "\nekf: the mean NEES of x over 3 runs is 4, outside the 95 % bounds [0.206, 2.41]: the "
+      "filter is overconfident\n";
   EXPECT_TRUE(TableOf(result).ends_with(line)) << TableOf(result);
   for (SweepRun& run : result.done) {
     run.estimators[0] = Add(run.estimators[0], {{"nees.mean:x", 2.0}});
@@ -188,8 +189,8 @@ TEST(SweepTable, FoldsAsAComparisonDoes) {
       run.estimators.back().name = name;
     }
   }
-  // The label has 12 characters and each column has 29, so three columns take 99 characters. The
-  // fourth column is printed below.
+  // The label has 12 characters and each column has 29 characters, so three columns take 99
+  // characters. The fourth column is printed below.
   const std::string table = TableOf(result);
   EXPECT_EQ(table.find('\n'), 99u) << table;
   EXPECT_NE(table.find("\n\n" + std::string(40, ' ') + "c\nrmse x "), std::string::npos) << table;

@@ -14,8 +14,8 @@ constexpr std::int64_t kMaxIndex = INT32_MAX;
 /// Quaternion of the rotation by pi about x, which is its own inverse. It converts between a frame
 /// with y up and -z ahead and a frame with y down and +z ahead.
 constexpr double kHalfTurn[4] = {0, 1, 0, 0};
-/// Sensor of both formats. They project by p = -P / P_z for either sign of P_z, so the domain is
-/// projective.
+/// Sensor of the formats BAL and Bundler. Both formats project by p = -P / P_z for either sign of
+/// P_z, so the domain is projective.
 const char* const kRadial =
     "{model: self_calibrating_feature, lens: radial, domain: projective, sigma_px: 1}";
 
@@ -54,11 +54,12 @@ std::array<double, 12> BundlerPose(const BundleFile& file, std::size_t i) {
   return pose;
 }
 
-/// Reads f, k1 and k2. If `may_be_missing`, f = 0 is accepted; it marks an unregistered image.
+/// Reads f, k1 and k2. If `may_be_missing` is true, f = 0 is accepted. This value marks an image
+/// that is not registered.
 void ReadLens(BundleCursor& cursor, bool may_be_missing, double* lens) {
   lens[0] = cursor.Number("focal length of a camera");
   if (!(lens[0] > 0.0) && !(may_be_missing && lens[0] == 0.0))
-    cursor.Fail("the focal length is not positive", "a number of px above 0");
+    cursor.Fail("the focal length is not positive", "a positive number in px");
   cursor.Numbers("k1, k2 of a camera", 2, lens + 1);
 }
 
@@ -72,7 +73,8 @@ void ReadBundlerCamera(BundleCursor& cursor, BundleFile& file) {
   const bool missing = lens[0] == 0.0 && r.isZero();  // the image is not registered
   constexpr double kRounding = 1e-3;
   if (!missing && (!(r * r.transpose()).isIdentity(kRounding) || !(r.determinant() > 0.0)))
-    cursor.Fail("the 9 numbers that end here are not a rotation matrix", "an orthonormal matrix");
+    cursor.Fail("the 9 numbers that end here are not a rotation matrix",
+                "an orthonormal matrix with the determinant 1");
   cursor.Numbers("translation of a camera", 3, pose.data() + 9);
   const Eigen::Quaterniond q =
       missing ? Eigen::Quaterniond::Identity() : Eigen::Quaterniond(Eigen::Matrix3d(r));
@@ -98,7 +100,7 @@ void ReadBundlerPoint(BundleCursor& cursor, int point, BundleFile& file) {
     observation.point = point;
     const auto lens = static_cast<std::size_t>(observation.camera);
     if (problem.intrinsics[lens][0] == 0.0)
-      cursor.Fail("this camera is not registered", "a camera whose focal length is not 0");
+      cursor.Fail("the observed camera is not registered", "a camera whose focal length is not 0");
     file.keys.push_back(cursor.Index("a key", kMaxIndex));
     observation.z[0] = cursor.Number("u");
     observation.z[1] = -cursor.Number("v");

@@ -62,7 +62,7 @@ std::optional<double> SquaredError(const SensorModel& sensor, const BundleRoles&
   return std::isfinite(sum) ? std::optional(sum) : std::nullopt;
 }
 
-/// Gauge of a problem: the first used camera and the extent (BundleResult::extent_before).
+/// Gauge of a problem: the first used camera, and the extent as in BundleResult::extent_before.
 class Gauge {
  public:
   explicit Gauge(const BundleProblem& problem)
@@ -107,7 +107,7 @@ class Gauge {
   }
 
  private:
-  std::vector<bool> cameras_, points_;  ///< true: used by an observation
+  std::vector<bool> cameras_, points_;  ///< true: an observation uses the camera or point
   std::size_t first_ = 0;
   bool uses_points_ = false;  ///< true: Extent() uses the points, not the cameras
 };
@@ -181,7 +181,7 @@ std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std
       throw Error(ExitCode::kUsage, ErrorLine({}, "--fix",
                                               '\'' + name + "' cannot be fixed: sensor '" +
                                                   sensor.name() + "' does not estimate intrinsics",
-                                              "only 'intrinsics'"));
+                                              "'intrinsics', or no option --fix"));
     }
     return {};
   }
@@ -237,7 +237,8 @@ double BundleRms(const SensorModel& sensor, const BundleProblem& problem) {
 BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
                           const BundleOptions& options, const std::filesystem::path& folder) {
   if (std::ranges::none_of(problem.observations, &BundleObservation::used))
-    throw Error(ExitCode::kBadData, ErrorLine({}, {}, "no observation can be used"));
+    throw Error(ExitCode::kBadData,
+                ErrorLine({}, {}, "the problem does not contain a usable observation"));
   const double scale = options.loss.scale;
   if (options.loss.kind != LossKind::kNone &&
       !(scale >= kBundleLossScaleMin && scale <= kBundleLossScaleMax)) {

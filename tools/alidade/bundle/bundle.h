@@ -71,8 +71,8 @@ struct BundleResult {
   int residuals = 0;  ///< number of scalar residuals
   int unknowns = 0;   ///< number of estimated tangent elements; the constant first pose is excluded
   /// Extent of the problem: the median distance from the first used camera to the other used
-  /// cameras. If this median is 0, the median distance to the used points replaces it. Without
-  /// any distance, the extent is 0.
+  /// cameras. If this median is 0, it is replaced by the median distance to the used points. If
+  /// there are no such distances, the extent is 0.
   double extent_before = 0.0, extent_after = 0.0;
   /// Rank of the Jacobian at the solution. It is -1 if there are more than kBundleRankUnknowns
   /// unknowns, or if the Jacobian is not finite.
@@ -103,15 +103,15 @@ SharedSensor BundleSensor(const PluginHost& host, const BundleProblem& problem);
 
 /// Sets BundleObservation::used to false if h is undefined or |z (-) h|^2 is not finite at the
 /// values of the problem, otherwise to true. h is undefined for a point behind the camera. For a
-/// projective camera, h is undefined for a point in the plane of the camera. Returns the number of
-/// excluded observations.
+/// projective camera, h is undefined only for a point in the plane of the camera. Returns the
+/// number of excluded observations.
 int ExcludeUndefined(const SensorModel& sensor, BundleProblem& problem);
 
 /// Computes the unweighted RMS reprojection error of the used observations:
 ///
-///   rms = sqrt(sum_i |z_i (-) h_i|^2 / n),   n the number of observations
+///   rms = sqrt(sum_i |z_i (-) h_i|^2 / n),   n = number of used observations
 ///
-/// The unit is px, as of z. Returns 0 if no observation is used.
+/// The unit is that of z, px. Returns 0 if no observation is used.
 double BundleRms(const SensorModel& sensor, const BundleProblem& problem);
 
 inline constexpr const char* kBundleAdjusterKind = "bundle adjuster";
@@ -127,16 +127,16 @@ constexpr CppEntry EntryOf(const BundleAdjusterEntry& adjuster) {
 
 /// Adjusts cameras, points and the free intrinsics of `problem` to minimise the cost. The pose of
 /// the first used camera is constant. A sensor that measures at most two numbers does not determine
-/// the scale. The solution is then scaled about the first camera to the initial extent
-/// (BundleResult). The plugin of the Ceres solver computes the solution. This plugin is loaded from
-/// `folder` at the first use. If `folder` is empty, it is loaded from the folder of the library.
+/// the scale. For such a sensor, the solution is scaled about the first camera to the initial
+/// extent (BundleResult). The plugin of the Ceres solver computes the solution. This plugin is
+/// loaded from `folder` at the first use, or from the folder of the library if `folder` is empty.
 /// Errors: kPlugin if the plugin is missing; kNotTrusted; kBadData if no observation is used;
 /// kUsage as for FixedElements(), and if the scale of the loss is out of bounds.
 BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
                           const BundleOptions& options, const std::filesystem::path& folder = {});
 
-/// Describes the quantities that the used observations do not determine, one in each line: the
-/// gauge, separate components, points observed once, directions without information.
+/// Describes the quantities that the used observations do not determine. Each line describes one
+/// quantity: the gauge, separate components, points observed once, directions without information.
 std::vector<std::string> DescribeUndetermined(const BundleProblem& problem,
                                               const SensorModel& sensor,
                                               const BundleResult& result);

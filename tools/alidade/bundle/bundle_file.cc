@@ -46,7 +46,7 @@ std::string ReadAll(const std::filesystem::path& file) {
   const auto fail = [&](ExitCode code, int error) {
     if (error == EINTR) {
       throw Error(ExitCode::kStopped,
-                  ErrorLine(place, {}, "stopped by a signal while waiting for data"));
+                  ErrorLine(place, {}, "a signal stopped the program while it waited for data"));
     }
     const char* const expected = code == ExitCode::kInputMissing ? "a readable file" : "";
     throw Error(code, ErrorLine(place, {}, std::strerror(error), expected));
@@ -76,14 +76,15 @@ BundleFile ReadBundle(const std::filesystem::path& file) {
   if (IsLibmv(view)) return internal::ReadLibmv(view, name);
   if (view.starts_with(internal::kBundlerHeader)) return internal::ReadBundler(view, name);
   if (view.starts_with("# Bundle")) {
-    FailFormat(name, '\'' + std::string(view.substr(0, view.find_first_of("\r\n"))) + '\'',
-               std::string(internal::kBundlerHeader));
+    FailFormat(name,
+               "the header is '" + std::string(view.substr(0, view.find_first_of("\r\n"))) + '\'',
+               '\'' + std::string(internal::kBundlerHeader) + '\'');
   }
   const std::size_t first = std::min(view.find('\n'), view.size());
   if (view.substr(0, first).find(',') != view.npos) {
     FailFormat(name,
                "the columns are separated by commas: tracks need a calibration and initial poses",
-               "--camera FILE and --start FILE");
+               "the options --camera FILE and --start FILE");
   }
   return internal::ReadBal(view, name);
 }

@@ -25,7 +25,7 @@ enum class BundleFormat { kBal, kBundler, kLibmv, kTracks };
 /// Returns `bal`, `bundler`, `libmv` or `tracks`.
 const char* ToString(BundleFormat format);
 
-/// Problem, and the other contents of the file, which are needed to write the file again.
+/// Problem, and the other contents of its file, which are needed to write the file again.
 struct BundleFile {
   BundleFormat format = BundleFormat::kBal;
   BundleProblem problem;
@@ -43,7 +43,7 @@ struct BundleFile {
   std::vector<std::int64_t> camera_ids;  ///< libmv: image; tracks: frame; otherwise empty
   std::vector<std::int64_t> point_ids;   ///< libmv: track; tracks: feature; otherwise empty
   std::vector<Timestamp> timestamps;     ///< tracks: timestamp of each camera; otherwise empty
-  // Counts of excluded items; for tracks only.
+  // Numbers of excluded items. They are 0 for all formats except tracks.
   int points_left_out = 0;        ///< points that could not be triangulated
   int frames_left_out = 0;        ///< frames without a pose
   int unplaced_observations = 0;  ///< observations of the excluded points and frames
@@ -62,11 +62,12 @@ struct BundleTracks {
 };
 
 /// Reads tracks of one camera (dim 0, 1) or of a rectified pair (0 to 3). Frames have the
-/// timestamps of `timestamps.csv` in the folder of the tracks; a pose belongs to a frame if their
-/// times differ by at most 1 us. Without that file, or from standard input (`-`), pose k belongs to
-/// frame k. Frames without a pose are excluded. `host` creates the sensor. Points are triangulated
-/// from the initial poses with the inverse measurement model of the sensor. Points that cannot be
-/// triangulated are excluded. Errors: kInputMissing, kBadData, kBadConfig, kPlugin.
+/// timestamps of `timestamps.csv` in the folder of the tracks. A pose belongs to a frame if the
+/// times of both differ by at most 1 us. If this file does not exist, or if the tracks are read
+/// from standard input (`-`), pose k belongs to frame k. Frames without a pose are excluded. `host`
+/// creates the sensor. Points are triangulated from the initial poses with the inverse measurement
+/// model of the sensor. Points that cannot be triangulated are excluded. Errors: kInputMissing,
+/// kBadData, kBadConfig, kPlugin.
 BundleFile ReadBundleTracks(const BundleTracks& sources, const PluginHost& host);
 
 /// Returns the text of the problem in the format of its file. Numbers have the shortest form that

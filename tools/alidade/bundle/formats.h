@@ -20,8 +20,8 @@ std::string LibmvBytes(const BundleFile& file);
 
 inline constexpr std::string_view kBundlerHeader = "# Bundle file v0.3";
 
-/// Converts x_cam = R(q) x_world + t to a camera. If `looks_back`, the camera frame of q and t has
-/// y up, and the camera looks along -z.
+/// Converts x_cam = R(q) x_world + t to a camera. If `looks_back` is true, the camera frame of q
+/// and t has y up, and the camera looks along -z.
 BundleCamera CameraFromTransform(const double* q, const double* t, bool looks_back);
 /// Computes q and t of a camera: the inverse of CameraFromTransform.
 void TransformFromCamera(const BundleCamera& camera, bool looks_back, double* q, double* t);

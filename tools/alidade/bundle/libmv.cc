@@ -25,7 +25,8 @@ class BinaryReader {
   std::int32_t Integer(const char* quantity) { return std::bit_cast<std::int32_t>(Word(quantity)); }
   double Number(const char* quantity) {
     const float value = std::bit_cast<float>(Word(quantity));
-    if (!std::isfinite(value)) Fail(offset_ - 4, std::string(quantity) + " is not finite");
+    if (!std::isfinite(value))
+      Fail(offset_ - 4, std::string("a number of ") + quantity + " is not finite");
     return value;
   }
   void Numbers(const char* quantity, std::size_t count, double* values) {
@@ -69,11 +70,11 @@ void ReadCamera(BinaryReader& bytes, BundleFile& file, std::map<std::int64_t, in
   if (!index.emplace(image, number).second)
     bytes.Fail(offset, "there is a second camera for image " + std::to_string(image));
   std::vector<double> pose(12);
-  bytes.Numbers("rotation and translation of a camera", 12, pose.data());
+  bytes.Numbers("the rotation and translation of a camera", 12, pose.data());
   const Eigen::Map<const Eigen::Matrix3d> r(pose.data());  // column-major
   constexpr double kRounding = 1e-3;
   if (!(r * r.transpose()).isIdentity(kRounding) || !(r.determinant() > 0.0))
-    bytes.Fail(offset + 4, "the 9 numbers are not a rotation matrix");
+    bytes.Fail(offset + 4, "the 9 numbers that start here are not a rotation matrix");
   const Eigen::Quaterniond q{Eigen::Matrix3d(r)};
   const double wxyz[4] = {q.w(), q.x(), q.y(), q.z()};
   file.problem.cameras.push_back(CameraFromTransform(wxyz, pose.data() + 9, false));
@@ -117,7 +118,7 @@ BundleFile ReadLibmv(std::string_view text, const std::string& name) {
   BundleProblem& problem = file.problem;
   problem.sensor = "{model: self_calibrating_feature, lens: radtan, sigma_px: 1}";
   problem.intrinsics.assign(1, std::vector<double>(kLens));
-  bytes.Numbers("intrinsics", kLens, problem.intrinsics[0].data());
+  bytes.Numbers("the intrinsics", kLens, problem.intrinsics[0].data());
   if (!(problem.intrinsics[0][0] > 0.0)) bytes.Fail(2, "the focal length is not positive");
   std::map<std::int64_t, int> cameras, points;
   const int camera_count = bytes.Count("the number of cameras");

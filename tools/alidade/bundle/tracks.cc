@@ -33,7 +33,7 @@ Tracks ReadTracks(const std::filesystem::path& path, int& dims) {
   NumberRows rows(path, {}, {});
   while (NextRow(rows, 4, "frame,feature,dim,value")) {
     const std::int64_t dim = rows.Index(2, "dim");
-    if (dim > 3) rows.FailCell(2, "dim", "is unknown", "0 u, 1 v, 2 u_right, 3 v_right");
+    if (dim > 3) rows.FailCell(2, "dim", "is unknown", "0 (u), 1 (v), 2 (u_right) or 3 (v_right)");
     TrackEntry& entry = tracks[rows.Index(0, "frame")][rows.Index(1, "feature")];
     const auto d = static_cast<std::size_t>(dim);
     if (entry.lines[d] != 0) {
@@ -44,17 +44,18 @@ Tracks ReadTracks(const std::filesystem::path& path, int& dims) {
     entry.lines[d] = rows.line();
     dims = std::max(dims, dim > 1 ? 4 : 2);
   }
-  if (tracks.empty()) rows.FailLine("no rows", "frame,feature,dim,value");
+  if (tracks.empty()) rows.FailLine("the file contains no rows", "frame,feature,dim,value");
   for (const auto& [frame, features] : tracks) {
     for (const auto& [feature, entry] : features) {
       for (int d = 0; d < dims; ++d) {
         if (entry.lines[static_cast<std::size_t>(d)] != 0) continue;
         const Place place{rows.name(), *std::ranges::max_element(entry.lines)};
-        throw Error(ExitCode::kBadData,
-                    ErrorLine(place, {},
-                              "frame " + std::to_string(frame) + " has no dim " +
-                                  std::to_string(d) + " of feature " + std::to_string(feature),
-                              "dims 0 to " + std::to_string(dims - 1)));
+        throw Error(
+            ExitCode::kBadData,
+            ErrorLine(place, {},
+                      "in frame " + std::to_string(frame) + ", feature " + std::to_string(feature) +
+                          " has no row with dim " + std::to_string(d),
+                      "a row for each dim from 0 to " + std::to_string(dims - 1)));
       }
     }
   }
@@ -80,8 +81,8 @@ Start ReadStart(const std::filesystem::path& path) {
   return start;
 }
 
-/// Finds the index of the pose of each frame. `times` is the file of timestamps. If it does not
-/// exist, pose k belongs to frame k.
+/// Finds the index of the pose of each frame. `times` is the file of timestamps. If this file does
+/// not exist, pose k belongs to frame k.
 std::map<std::int64_t, std::size_t> PosesOf(const Tracks& tracks, const Start& start,
                                             const std::filesystem::path& times) {
   std::map<std::int64_t, std::size_t> poses;
@@ -101,7 +102,7 @@ std::map<std::int64_t, std::size_t> PosesOf(const Tracks& tracks, const Start& s
     if (found != pose_at.end() && found->first <= t + kTolerance)
       poses[rows.Index(0, "frame")] = found->second;
   }
-  if (rows.line() < 2) rows.FailLine("no rows", "frame,t_s");
+  if (rows.line() < 2) rows.FailLine("the file contains no rows", "frame,t_s");
   return poses;
 }
 
@@ -155,8 +156,8 @@ std::optional<std::array<double, 3>> Triangulate(
   return point;
 }
 
-/// Creates the sensor of a problem of tracks from the camera file. Errors contain the name of that
-/// file. Sets `text` to the YAML of the sensor.
+/// Creates the sensor of a problem in the format `tracks` from the camera file. Errors contain the
+/// name of the camera file. Sets `text` to the YAML of the sensor.
 SharedSensor TrackSensor(const BundleTracks& sources, int dims, const PluginHost& host,
                          std::string& text) {
   Config config = Config::FromFile(sources.camera);

@@ -43,12 +43,12 @@ std::string EndText(const ChildEnd& end, const internal::CallRecord& record, dou
   if (end.timed_out) {
     const std::string place =
         record.call().empty() ? "before its first call" : "in " + record.call() + state;
-    return "the check took longer than " + NumberText(timeout_s) + " s (--timeout); it ended " +
-           place;
+    return "the check took longer than " + NumberText(timeout_s) +
+           " s (--timeout); it was stopped " + place;
   }
   std::string text = record.call().empty() ? "the check" : record.call();
   text += ' ' + end.text;
-  if (!record.state().empty()) text += "; at " + record.state();
+  if (!record.state().empty()) text += " at " + record.state();
   return text;
 }
 
@@ -81,10 +81,9 @@ Finding RunCheck(const Check& check, const PluginEntry& entry, const Node& param
   const auto contains = [&](const char* words) {
     return finding.text.find(words) != std::string::npos;
   };
-  // The second text is that of a thread whose stack cannot be allocated.
+  // The second text appears if the stack of a thread cannot be allocated.
   if (contains("std::bad_alloc") || contains("Resource temporarily unavailable")) {
-    finding.text +=
-        "; the limit of memory is " + std::to_string(options.memory_mb) + " MB (--memory)";
+    finding.text += "; the memory limit is " + std::to_string(options.memory_mb) + " MB (--memory)";
   }
   return finding;
 }
@@ -141,7 +140,7 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
       if (entry.is_model()) names.push_back(entry.name);
     }
     throw Error(ExitCode::kPlugin,
-                ErrorLine({}, {}, "no plugin '" + plugin + "' with a sensor or motion model", {},
+                ErrorLine({}, {}, "no sensor or motion model was found for '" + plugin + "'", {},
                           Nearest(plugin, names)) +
                     "\n" + PluginPlaces(host));
   }
@@ -149,9 +148,10 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
   for (const PluginEntry& entry : found) names.push_back(entry.name);
   std::erase_if(found, [&](const PluginEntry& entry) { return entry.name != model; });
   if (found.empty()) {
-    throw Error(ExitCode::kPlugin,
-                ErrorLine({}, {}, "plugin '" + plugin + "' offers no model '" + model + "'", {},
-                          Nearest(model, names)));
+    throw Error(
+        ExitCode::kPlugin,
+        ErrorLine({}, {}, "plugin '" + plugin + "' does not contain a model '" + model + "'", {},
+                  Nearest(model, names)));
   }
   return found;
 }

@@ -56,7 +56,7 @@ std::unique_ptr<ModelUnderTest> Context::Create() const {
 }
 
 void Context::Destroy(std::unique_ptr<ModelUnderTest> model) const {
-  std::string thrown;  // the host only logs a warning if a destructor throws
+  std::string thrown;  // text of an exception; the host logs it as a warning
   record_.Enter("destroy");
   {
     const auto record_text = [&](LogLevel, std::string_view text) { thrown = text; };

@@ -19,7 +19,7 @@ struct CheckedState {
   bool defined = false;  ///< true: Predict or Step is defined at the state
 };
 
-/// Context of a check in the child process: the model under test and its states.
+/// Context of a check in the child process: the model under test and the tested states.
 class Context {
  public:
   Context(const PluginEntry& entry, const Node& parameters, const CheckOptions& options,
@@ -37,7 +37,7 @@ class Context {
   /// Returns Predict of a sensor or Step of a motion model.
   const Function& main() const { return model_->functions.front(); }
 
-  /// Throws kBadConfig if a given parameter is not read by the model.
+  /// Throws kBadConfig if the model does not read one of the given parameters.
   void RejectUnread() const { parameters_.RejectUnread(); }
   /// Creates another instance with the same parameters.
   std::unique_ptr<ModelUnderTest> Create() const;

@@ -19,13 +19,13 @@ using Eigen::MatrixXd;
 /// "".
 std::string ValueDefect(const Function& f, const Answer& a, const Answer& b, const Values& inputs) {
   if (a.code != b.code) {
-    return "status " + std::to_string(a.code) + " and " + std::to_string(b.code);
+    return "the status codes are " + std::to_string(a.code) + " and " + std::to_string(b.code);
   }
   if (!a.ok()) return {};
   const Values x = OutputValues(a);
   const double distance = Difference(f.outputs, x, OutputValues(b)).abs().maxCoeff();
   if (distance <= 1e-12 * (1.0 + Largest(x) + Largest(inputs))) return {};
-  return StateText(f.outputs, x) + ", " + RoundedText(distance) + " apart";
+  return StateText(f.outputs, x) + ", difference " + RoundedText(distance);
 }
 
 /// One entry of a Jacobian: the value from the model and the numeric derivative.
@@ -39,7 +39,7 @@ struct Entry {
   }
 };
 
-/// Comparison of the Jacobian of a function at one state with numeric differences.
+/// Test that compares the Jacobian of one function with numeric differences at one state.
 class JacobianTest {
  public:
   JacobianTest(const Context& context, const Function& f, const Values& inputs)
@@ -92,8 +92,8 @@ class JacobianTest {
     return Difference(f_.outputs, OutputValues(answer), centre_);
   }
   std::vector<Entry> Compare(const Derivative& numeric, const ArrayXd& column, double h) const {
-    // Rounding error of the values divided by the smallest step; the factor 100 allows for the
-    // amplification by extrapolation.
+    // Rounding error of the values, divided by the smallest step. The factor 100 allows for the
+    // amplification of this error by the extrapolation.
     const double size = std::max(Largest(centre_), Largest(inputs_));
     const double floor = 100.0 * 2.2e-16 * size / (kSmallestStep * h);
     std::vector<Entry> entries;
@@ -120,7 +120,7 @@ class JacobianTest {
 /// Intermediate results of CheckJacobian().
 struct JacobianTally {
   long judged = 0;     ///< number of compared entries
-  double worst = 0.0;  ///< relative distance of the worst wrong entry
+  double worst = 0.0;  ///< largest relative difference of a wrong entry
   std::string failure;
 };
 
@@ -141,8 +141,8 @@ void TestJacobian(const Context& context, const Function& f, const CheckedState&
         tally.worst = entry.Distance();
         tally.failure = f.name + ": d " + rows[static_cast<std::size_t>(entry.row)] + " / d " +
                         columns[static_cast<std::size_t>(k)] + " is " + RoundedText(entry.model) +
-                        " from the model, " + RoundedText(entry.numeric) + " by differences; " +
-                        context.CallText(f, inputs);
+                        " from the model, but " + RoundedText(entry.numeric) +
+                        " from numeric differences; " + context.CallText(f, inputs);
       }
     }
     column += count;
@@ -156,7 +156,8 @@ std::string KindsText(const ModelUnderTest& model) {
   std::string text;
   for (const Function& f : model.functions) {
     if (f.differentiated == 0) continue;
-    const bool is_analytic = analytic && f.name != "Initialise";  // differentiated automatically
+    // The Jacobian of Initialise is always computed by automatic differentiation.
+    const bool is_analytic = analytic && f.name != "Initialise";
     text += (text.empty() ? "" : ", ") + f.name +
             (is_analytic ? ": analytic Jacobian" : ": automatic differentiation");
   }
@@ -193,9 +194,9 @@ Finding CheckJacobian(Context& context) {
     }
   }
   if (!tally.failure.empty()) return Fail(tally.failure);
-  if (tally.judged == 0) return Skip("no numeric derivative is accurate enough");
+  if (tally.judged == 0) return Skip("no numeric derivative is accurate enough for a comparison");
   return Ok(KindsText(context.model()) + "; " + std::to_string(tally.judged) +
-            " entries agree with differences");
+            " entries agree with numeric differences");
 }
 
 }  // namespace alidade::internal

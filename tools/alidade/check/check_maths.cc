@@ -16,7 +16,7 @@ namespace {
 using Eigen::ArrayXd;
 using Eigen::MatrixXd;
 
-// Relative tolerance of values that are equal up to rounding error.
+// Relative tolerance for the comparison of values that may differ by rounding errors.
 constexpr double kRounding = 1e-9;
 
 /// Largest deviation of a value from its expected value, relative to the tolerance.
@@ -114,8 +114,8 @@ std::optional<NoisyStep> StepWithNoise(const Context& context, Values inputs, co
 
 /// Relative difference between the noise covariances over two parts of dt and over the whole dt.
 struct PartsDefect {
-  double discrete = 0.0;    ///< if both parts have the same w
-  double continuous = 0.0;  ///< if each part has an independent w
+  double discrete = 0.0;    ///< difference if both parts have the same w
+  double continuous = 0.0;  ///< difference if each part has an independent w
 };
 
 std::optional<PartsDefect> DefectOfParts(const Context& context, const Values& inputs,
@@ -155,24 +155,24 @@ std::optional<PartsDefect> LimitOfParts(const Context& context, const CheckedSta
 /// Describes the remedy for noise that is not of the declared kind.
 std::string NoiseKindRemedy(bool discrete, bool other_fits) {
   if (!other_fits) {
-    return "its noise is neither discrete nor continuous. Discrete noise, such as an acceleration, "
+    return "the noise is neither discrete nor continuous. Discrete noise, such as an acceleration, "
            "is "
            "constant over dt, and Lq does not depend on dt. Continuous noise satisfies "
            "Q(dt) = F Q(dt_1) F' + Q(dt_2)";
   }
-  return discrete ? "the noise adds up over the parts: omit noise_kind(), or return "
+  return discrete ? "the noise accumulates over the parts: omit noise_kind(), or return "
                     "NoiseKind::kContinuous"
                   : "the noise is constant over the parts: declare it by `NoiseKind noise_kind() "
-                    "const { return NoiseKind::kDiscrete; }`, or let Q grow with dt";
+                    "const { return NoiseKind::kDiscrete; }`, or make Q grow with dt";
 }
 
-/// Compares the results of f for q and -q, with q the quaternion at `offset` of input i.
+/// Compares the results of f for q and -q. q is the quaternion at `offset` in input i.
 void CompareCovers(Context& context, const Function& f, std::size_t i, int offset,
                    WorstDeviation& worst) {
   const std::string& name = context.model().slots[static_cast<std::size_t>(f.slots[i])].name;
   for (const CheckedState& state : context.states()) {
     Values negated = Context::Inputs(f, state);
-    // Skip a half turn: there, the sign of a zero determines the sign of the logarithm.
+    // A half turn is skipped: there, the sign of a zero determines the sign of the logarithm.
     if (negated[i].empty() || negated[i][static_cast<std::size_t>(offset)] == 0.0) continue;
     for (double& element : std::span(negated[i]).subspan(offset, 4)) element = -element;
     const Answer a = context.Call(f, state), b = context.CallWith(f, negated, kAllMatrices);
@@ -203,7 +203,7 @@ Finding CheckNoise(Context& context) {
       for (int c = 0; c < factor.columns(); ++c) {
         if (std::isfinite(l(r, c)) && !Unwritten(l(r, c))) continue;
         return Fail(context.CallText(*f, state) + ": entry (" + std::to_string(r) + ", " +
-                    std::to_string(c) + ") " +
+                    std::to_string(c) + ") of the noise factor " +
                     (Unwritten(l(r, c)) ? "is not written" : "is " + NumberText(l(r, c))));
       }
     }
@@ -254,7 +254,8 @@ Finding CheckInitialise(Context& context) {
       return context.CallText(*f, state) + " returns " + StateText(f->outputs, initialised) +
              ", for which Predict " +
              (prediction.ok()
-                  ? "returns " + StateText(context.main().outputs, OutputValues(prediction))
+                  ? "returns " + StateText(context.main().outputs, OutputValues(prediction)) +
+                        " instead of the measurement"
                   : std::string("is not defined"));
     };
     worst.Add(prediction.ok() ? 0.0 : 2.0, 1.0, text);
@@ -295,7 +296,7 @@ Finding CheckStep(Context& context) {
     const double previous_ratio = additive.ratio;
     additive.Add(split->defect, kRounding * split->size, [&] {
       return context.CallText(f, state) +
-             ", w = 0: one step over dt and two steps over two parts of dt differ by " +
+             ", but without noise: one step over dt and two steps over two parts of dt differ by " +
              RoundedText(split->defect) + " in " + names[static_cast<std::size_t>(split->row)];
     });
     if (additive.ratio > previous_ratio) order = OrderOf(context, f, inputs, blocks);
@@ -314,8 +315,8 @@ Finding CheckStep(Context& context) {
               "kStepOrder = N;`, or pass --step-order N");
 }
 
-// If the declared kind is wrong, the defect is at least 0.47 for every dt. If it is correct, the
-// defect vanishes for dt -> 0.
+// If the declared kind is wrong, the defect is at least 0.47 for every dt. If the declared kind is
+// correct, the defect vanishes for dt -> 0.
 Finding CheckNoiseKind(Context& context) {
   constexpr double kMaxDefect = 0.1;
   if (context.model().is_sensor()) return Skip("the model is not a motion model");
@@ -344,11 +345,11 @@ Finding CheckNoiseKind(Context& context) {
               " noise: the covariance over two parts of dt equals the covariance over dt, up to "
               "integration error");
   }
-  return Fail("declares " + kind +
+  return Fail("the model declares " + kind +
               " noise, but for small dt the covariance over two parts of dt differs from the "
               "covariance over dt by " +
-              std::to_string(std::lround(100.0 * declared_defect)) + " %, at " + worst_call + "; " +
-              NoiseKindRemedy(discrete, other_defect <= kMaxDefect));
+              std::to_string(std::lround(100.0 * declared_defect)) + " % in the call " +
+              worst_call + "; " + NoiseKindRemedy(discrete, other_defect <= kMaxDefect));
 }
 
 }  // namespace alidade::internal

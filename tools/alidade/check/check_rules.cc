@@ -45,14 +45,15 @@ std::string CodeDefect(const Context& context, const Function& f, std::int32_t c
       const AlidadeInstance& c = context.model().instance->c();
       return c.error_text == nullptr ? std::string() : context.model().instance->error_text();
     }();
-    return "failed: " + (text.empty() ? "the model does not set an error text" : text);
+    return "the function failed: " + (text.empty() ? "the model does not set an error text" : text);
   }
   const bool may_refuse = f.name == "Valid" || f.name == "Initialise";
   if (code == ALIDADE_OK || (code == ALIDADE_INVALID && may_refuse)) return {};
   if (code == ALIDADE_OUT_OF_DOMAIN && f.name != "Valid") {
-    return f.is_noise ? "is out of domain, although " + context.main().name + " is defined" : "";
+    return f.is_noise ? "the noise is undefined, although " + context.main().name + " is defined"
+                      : "";
   }
-  return "returned " + std::to_string(code) + ", which is not a valid status of this function";
+  return "the function returned " + std::to_string(code) + ", which is not a valid status";
 }
 
 /// Settings of the process that determine how numbers are rounded and formatted.
@@ -156,25 +157,25 @@ Finding CheckCalls(Context& context) {
 }
 
 Finding CheckBounds(Context& context) {
-  const std::string failure =
-      FirstFailure(context, [&](const Function& f, const CheckedState& state) {
-        const Answer answer = context.Call(f, state);
-        if (answer.written_input >= 0) {
-          const int slot = f.slots[static_cast<std::size_t>(answer.written_input)];
-          return context.CallText(f, state) + ": writes to the input " +
-                 context.model().slots[static_cast<std::size_t>(slot)].name;
-        }
-        for (const auto* buffers : {&answer.outputs, &answer.matrices}) {
-          for (std::size_t i = 0; i < buffers->size(); ++i) {
-            if ((*buffers)[i].GuardsIntact()) continue;
-            const std::string output = buffers == &answer.outputs ? f.outputs[i].name
-                                       : f.is_noise               ? "factor"
-                                                                  : "Jacobian " + std::to_string(i);
-            return context.CallText(f, state) + ": writes outside the buffer of " + output;
-          }
-        }
-        return std::string();
-      });
+  const std::string failure = FirstFailure(context, [&](const Function& f,
+                                                        const CheckedState& state) {
+    const Answer answer = context.Call(f, state);
+    if (answer.written_input >= 0) {
+      const int slot = f.slots[static_cast<std::size_t>(answer.written_input)];
+      return context.CallText(f, state) + ": the function writes to the input " +
+             context.model().slots[static_cast<std::size_t>(slot)].name;
+    }
+    for (const auto* buffers : {&answer.outputs, &answer.matrices}) {
+      for (std::size_t i = 0; i < buffers->size(); ++i) {
+        if ((*buffers)[i].GuardsIntact()) continue;
+        const std::string output = buffers == &answer.outputs ? f.outputs[i].name
+                                   : f.is_noise               ? "factor"
+                                                              : "Jacobian " + std::to_string(i);
+        return context.CallText(f, state) + ": the function writes outside the buffer of " + output;
+      }
+    }
+    return std::string();
+  });
   return ToFinding(failure, "each function writes only to its outputs");
 }
 
@@ -260,7 +261,7 @@ Finding CheckFailure(Context& context) {
         for (const auto* buffers : {&answer.outputs, &answer.matrices}) {
           for (const Buffer& buffer : *buffers) {
             if (!buffer.Untouched())
-              return context.CallText(f, state) + ": fails, but writes an output";
+              return context.CallText(f, state) + ": the function fails, but writes an output";
           }
         }
         return std::string();

@@ -26,7 +26,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// A pipe whose ends are closed at the end of its scope.
+/// Pipe. The destructor closes both ends.
 class Pipe {
  public:
   explicit Pipe(int flags) {
@@ -112,7 +112,7 @@ std::string EndText(int status) {
   return "ended the process with exit code " + std::to_string(WEXITSTATUS(status));
 }
 
-/// Reads the first line from the pipe, truncated if it is too long.
+/// Returns the first line from the pipe. A long line is truncated.
 std::string FirstLine(int pipe_end) {
   char line[80] = "";
   if (read(pipe_end, line, sizeof line - 1) < 0) return {};
@@ -139,7 +139,8 @@ void CallRecord::Enter(const char* call, const std::string& state) {
 
 ChildEnd RunInChild(const ChildLimits& limits, const std::function<std::string()>& work) {
   Pipe answer(0), output(O_NONBLOCK);
-  std::fflush(nullptr);  // otherwise the child prints the program's buffered output again
+  // Without this call, the child would print the buffered output of the program again.
+  std::fflush(nullptr);
   const pid_t parent = getpid();
   const pid_t child = fork();
   if (child == 0) RunChild(limits, parent, answer, output, work);

@@ -32,21 +32,21 @@ class CallRecord {
 
 struct ChildLimits {
   double timeout_s = 10.0;
-  int memory_mb = 0;  ///< limit, in addition to the memory already in use; 0: no limit
+  int memory_mb = 0;  ///< additional memory that the child may allocate; 0: no limit
 };
 
 struct ChildEnd {
   bool answered = false;
-  bool timed_out = false;  ///< killed because it exceeded the time limit
-  /// The answer. If the child did not answer, a description of its end, as in
-  /// `crashed (signal 11, Segmentation fault)`.
+  bool timed_out = false;  ///< true: the child was killed because it exceeded the time limit
+  /// Answer of the child. If the child did not answer, the text describes how the process ended, as
+  /// in `crashed (signal 11, Segmentation fault)`.
   std::string text;
   std::string printed;  ///< first line that the child printed, truncated
 };
 
-/// Runs `work` in a child process and returns its answer. The child has the default signal handlers
-/// and its own process group. The group is killed when the child ends or exceeds `limits`. The
-/// output of the child is captured, and core dumps are disabled.
+/// Runs `work` in a child process and returns the answer. The child has the default signal handlers
+/// and a separate process group. The group is killed when the child ends or exceeds the time limit.
+/// The output of the child is captured, and core dumps are disabled.
 ChildEnd RunInChild(const ChildLimits& limits, const std::function<std::string()>& work);
 
 }  // namespace alidade::internal

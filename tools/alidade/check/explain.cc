@@ -69,8 +69,8 @@ std::string PriorText(const Prior& prior, const Block& block) {
   return text + " +- " + SigmasText(prior.covariance);
 }
 
-/// Returns a table of the blocks, followed by an explanation of `constant` and by a line for each
-/// unused truth with the reason.
+/// Returns a table of the blocks. Below the table, the text explains `constant`, and states why a
+/// truth is not used.
 std::string StateTable(const Problem& problem, const std::vector<StreamInfo>& truths) {
   const std::vector<int> block_truths = internal::MatchTruths(problem.layout, truths);
   std::vector<TextRow> rows = {
@@ -97,7 +97,7 @@ std::string StateTable(const Problem& problem, const std::vector<StreamInfo>& tr
   }
   for (std::size_t t = 0; t < truths.size(); ++t) {
     const std::string reason = internal::WhyNoBlock(problem.layout, truths, t);
-    if (!reason.empty()) text += "    truth not used: " + truths[t].name + ", " + reason + '\n';
+    if (!reason.empty()) text += "    truth " + truths[t].name + " is not used: " + reason + '\n';
   }
   return text;
 }
@@ -116,7 +116,7 @@ std::string InputText(const MotionBinding& motion) {
 std::string ConfigNoise(const std::string& name, const std::vector<double>& root, int size) {
   if (root.empty()) return "";
   const RowMajor l = Eigen::Map<const RowMajor>(root.data(), size, size);
-  return "    noise of " + name + ": the covariance of the config, sigma " +
+  return "    noise of " + name + ": covariance from the config, with sigma " +
          SigmasText(l * l.transpose()) + '\n';
 }
 
@@ -238,10 +238,10 @@ std::string NeedExcitation(const Problem& problem,
 
 std::string Unobservable(const Problem& problem) {
   if (problem.landmarks && !internal::PlaceLandmarks(problem)) {
-    return "  observability is not analysed: it depends on the landmarks\n";
+    return "  observability is not analysed, because it depends on the landmarks\n";
   }
   if (!internal::IsObservabilityComputed(problem)) {
-    return "  observability is not analysed: the state has more than " +
+    return "  observability is not analysed, because the state has more than " +
            std::to_string(internal::kMaxObservabilityElements) + " elements\n";
   }
   const std::vector<std::vector<std::string>> unobservable = UnobservableDirections(problem);
@@ -297,9 +297,10 @@ std::string OutOfSequenceText(const OutOfSequencePolicy& handling) {
           ? "buffer: frames are delayed"
           : "rollback: the estimators return to an earlier state and process all frames in order";
   return std::string("  out-of-sequence frames: ") + action +
-         (handling.window ? ", up to " + internal::RoundedText(Seconds(*handling.window), 6) +
-                                " s behind the newest frame"
-                          : " to the end of the run") +
+         (handling.window
+              ? "; a frame may be up to " + internal::RoundedText(Seconds(*handling.window), 6) +
+                    " s older than the newest frame"
+              : "; a frame may be of any age") +
          '\n';
 }
 
@@ -327,7 +328,7 @@ std::string CalibrationText(const Config& config, const Source& source) {
   return "  calibration of the data\n" + TextTable(rows, kIndent);
 }
 
-/// Returns a row for each key of the source that has a scalar value.
+/// Returns a table with a row for each key of the source that has a scalar value.
 std::string SourceKeys(const Node& source) {
   std::vector<TextRow> rows;
   for (const auto& [key, value] : source.Entries()) {

@@ -23,11 +23,11 @@ std::vector<TextRow> LandmarkRows(const Problem& problem) {
     std::string prior = "inverse distance " + NumberText(options.prior->inverse_distance) + " +- " +
                         NumberText(options.prior->sigma) + " 1/m";
     if (const int n = options.prior->adapt_after; n > 0) {
-      prior += "; replaced by the median of the landmarks in view after " + std::to_string(n) +
-               " of these have converged";
+      prior += "; if a frame measures " + std::to_string(n) +
+               " or more converged landmarks, their median replaces the prior";
     }
     if (const int n = options.prior->min_observations; n > 0) {
-      prior += "; applied at observation " + std::to_string(n);
+      prior += "; used from observation " + std::to_string(n);
     }
     add("prior", prior);
   }
@@ -35,25 +35,25 @@ std::vector<TextRow> LandmarkRows(const Problem& problem) {
                                ? "at the first observation"
                                : "at observation " + std::to_string(options.min_observations);
   if (options.max_per_frame < LandmarkOptions::kUnlimited) {
-    initialise +=
-        ", if fewer than " + std::to_string(options.max_per_frame) + " landmarks are measured";
+    initialise += ", if the frame measures fewer than " + std::to_string(options.max_per_frame) +
+                  " landmarks";
   }
   add("initialise", initialise);
   std::vector<std::string> prune;
   if (options.max_missed_frames > 0) {
-    prune.push_back("unseen for " + std::to_string(options.max_missed_frames) + " frames");
+    prune.push_back("not seen for " + std::to_string(options.max_missed_frames) + " frames");
   }
   if (options.min_match_ratio > 0.0) {
-    prune.push_back("fewer than " + NumberText(options.min_match_ratio) + " of " +
-                    std::to_string(options.min_attempts) + " or more measurements are accepted");
+    prune.push_back("accepted fraction below " + NumberText(options.min_match_ratio) +
+                    " after at least " + std::to_string(options.min_attempts) + " measurements");
   }
   if (options.negative_depth == LandmarkOptions::NegativeDepth::kDelete) {
-    prune.emplace_back("inverse distance not above 0");
+    prune.emplace_back("inverse distance not positive");
   }
   add("prune", prune.empty() ? "never" : Join(prune, "; "));
   add("convert to xyz",
       options.max_linearity_index > 0.0
-          ? "if the index of linearity is below " + NumberText(options.max_linearity_index)
+          ? "if the linearity index is below " + NumberText(options.max_linearity_index)
           : "never");
   if (!options.known.empty()) add("known", std::to_string(options.known.size()));
   return rows;

@@ -21,7 +21,7 @@ std::string GateText(const EkfOptions& options, const Problem& problem) {
   }
   std::vector<std::string> parts;
   for (const auto& [dof, threshold] : thresholds) {
-    parts.push_back(threshold + " at " + std::to_string(dof) + " dof");
+    parts.push_back(threshold + " for " + std::to_string(dof) + " dof");
   }
   return NumberText(options.gate) + ": accepts r' S^-1 r up to " + Join(parts);
 }
@@ -50,12 +50,16 @@ std::string RejectionRecoveryText(const EkfOptions& options, const Problem& prob
   }
   std::string after = " after " + std::to_string(options.rejection_recovery_after) +
                       " consecutive rejections of a sensor";
-  if (!unaffected.empty()) after += "; no effect for " + Join(unaffected);
+  if (!unaffected.empty()) {
+    after += "; no effect for sensors that do not correct a block: " + Join(unaffected);
+  }
   switch (options.rejection_recovery) {
     case RejectionRecovery::kReset:
-      return "reset the blocks of the sensor from the measurement, or inflate them," + after;
+      return "reset the block that the measurement determines, or inflate the covariance of the "
+             "blocks of the sensor," +
+             after;
     case RejectionRecovery::kInflate:
-      return "inflate the blocks of the sensor," + after;
+      return "inflate the covariance of the blocks of the sensor," + after;
     case RejectionRecovery::kNone:
       break;
   }

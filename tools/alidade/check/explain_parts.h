@@ -12,7 +12,7 @@ namespace alidade::internal {
 /// problem.landmarks.
 std::vector<TextRow> LandmarkRows(const Problem& problem);
 
-/// Returns a row of key and value for each option of an estimator.
+/// Returns a row with key and value for each option of an estimator.
 std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec);
 
 }  // namespace alidade::internal

@@ -21,7 +21,8 @@ bool SameBits(double a, double b) {
   return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }
 
-/// Fills the stack that the next call will use with kPoison, to reveal uninitialised locals.
+/// Fills the stack that the next call will use with kPoison, to reveal uninitialised local
+/// variables.
 [[gnu::noinline]] void PoisonStack() {
   volatile double cells[4096];
   for (volatile double& cell : cells) cell = kPoison;

@@ -14,8 +14,9 @@ namespace alidade::internal {
 /// One value for each space. An empty value represents an unbound optional role.
 using Values = std::vector<std::vector<double>>;
 
-/// Row-major matrix, or vector as one row. A cell contains 1e302 until it is written. Guard words
-/// surround the matrix and separate the rows. A callee must not write to the guard words.
+/// Row-major matrix. A vector is a matrix with one row. A cell contains 1e302 until it is written.
+/// Guard words surround the matrix and separate the rows. A callee must not write to the guard
+/// words.
 class Buffer {
  public:
   Buffer(int rows, int columns);
@@ -74,7 +75,8 @@ struct Answer {
   friend bool operator==(const Answer&, const Answer&) = default;
 };
 
-/// Values of the parameter `matrices`: no matrix or all. An index >= 0 requests one matrix.
+/// Values of the parameter `matrices` that request no matrix or all matrices. A value >= 0 is the
+/// index of one requested matrix.
 enum : int { kNoMatrix = -1, kAllMatrices = -2 };
 
 /// Model under test: its functions and the spaces of their inputs.

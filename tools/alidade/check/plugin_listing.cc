@@ -48,16 +48,18 @@ std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
                        std::vector<std::string> choices = {}) {
     keys.push_back({name, "", doc, type, "", fallback, std::move(choices), ""});
   };
-  add("sensors", "list", "all", "names of the sensors used, in the order of their updates");
+  add("sensors", "list", "all",
+      "names of the sensors that the estimator uses, in the order of their updates");
   add("use", "choice or map", "all",
-      "or {accepted_by: NAME}: only the measurements that the filter NAME accepts");
+      "all: every measurement; {accepted_by: NAME}: the measurements that the filter NAME accepts");
   add("on_divergence", "choice", "report", "report: continue the run; fail: end the run",
       {"report", "fail"});
   add("on_plugin_failure", "choice", "skip",
-      "if a call of a sensor fails: skip the measurement, disable the sensor, or end the run",
+      "after a failed call of a sensor: skip ignores the measurement, disable ignores the sensor "
+      "until the end of the run, abort ends the run",
       {"skip", "disable", "abort"});
   add("overrides", "map", "none",
-      "state, sensors, landmarks and initial_time_s of this estimator, merged into the config");
+      "state, sensors, landmarks and initial_time_s for this estimator; merged into the config");
   return keys;
 }
 
@@ -75,11 +77,10 @@ std::vector<const PluginEntry*> EntriesNamed(const PluginHost& host, const std::
   for (const PluginEntry* entry : entries) names.push_back(entry->name);
   std::erase_if(entries, [&](const PluginEntry* entry) { return entry->name != name; });
   if (entries.empty() && FindEstimatorType(name) == nullptr) {
-    throw Error(ExitCode::kPlugin, ErrorLine({}, {}, "no plugin offers '" + name + "'",
-                                             "a name from `alidade plugins list`, or a type of "
-                                             "estimator",
-                                             Nearest(name, names)) +
-                                       "\n" + PluginPlaces(host));
+    throw Error(ExitCode::kPlugin,
+                ErrorLine({}, {}, "no plugin entry or built-in estimator is named '" + name + "'",
+                          "a name from `alidade plugins list`", Nearest(name, names)) +
+                    "\n" + PluginPlaces(host));
   }
   return entries;
 }
@@ -88,7 +89,7 @@ std::string Parameters(const std::vector<ParamInfo>& schema) {
   std::vector<TextRow> rows = {
       {"parameter", "unit", "type", "range", "default", "only if", "meaning"}};
   for (const ParamInfo& info : schema) {
-    // A key from a source's own list has no type.
+    // Keys without a type come from the separate list of keys that a source plugin exports.
     const std::string fallback =
         !info.fallback.empty() || info.type.empty() ? info.fallback : "required";
     const std::string range = info.choices.empty() ? info.range : Join(info.choices, " | ");

@@ -10,8 +10,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Draws x = identity (+) d. The elements of a vector have magnitudes of 0.03 to 30; if `positive`,
-/// all are > 0.
+/// Draws x = identity (+) d. The elements of a vector have magnitudes from 0.03 to 30. If
+/// `positive` is true, all elements are positive.
 std::vector<double> RandomValue(const Geometry& geometry, bool positive, Random& random) {
   std::vector<double> x = geometry.Identity(), d;
   geometry.ForEachPart([&](const Geometry& part, int, int) {
@@ -32,8 +32,8 @@ std::vector<double> RandomValue(const Geometry& geometry, bool positive, Random&
 ///
 ///   vector   all elements 0, 1e-6 or 1e6, with either sign
 ///   product  the special points of one part, with the other parts at the neutral element
-///   others   the neutral element; the points at pi, just short of -pi and pi / 2 along each
-///            tangent direction; for a double cover also the negative of the neutral element
+///   others   the neutral element; the points at pi, -pi + 1e-9 and pi / 2 along each tangent
+///            direction; for a double cover, the negative of the neutral element
 std::vector<std::vector<double>> Edges(const Geometry& geometry) {
   std::vector<std::vector<double>> edges;
   if (geometry.is_vector()) {

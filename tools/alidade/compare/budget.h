@@ -18,8 +18,8 @@ class RunBudget {
   double elapsed_s() const;
   /// Records the duration of a finished run.
   void RecordRun(double run_s);
-  /// Returns true if another run would exceed the limit. Assumes that it takes as long as the
-  /// longest recorded run. Returns false until the first run is recorded.
+  /// Returns true if the next run would exceed the limit. The next run is assumed to take as long
+  /// as the longest recorded run. Returns false if no run is recorded yet.
   bool is_spent() const;
 
  private:
@@ -35,10 +35,10 @@ struct PredictedCpuTime {
   std::int64_t total_frames = 0;
 };
 
-/// Predicts the CPU time from the first ten frames. The experiment cannot be used afterwards. The
-/// cost of one solve of all data is assumed to be proportional to N, the number of frames. The cost
-/// of a solve at every frame is assumed to be proportional to N^2. Returns nullopt if the source
-/// does not report N, or if the run failed.
+/// Predicts the CPU time from the first ten frames. The experiment cannot be used afterwards. N is
+/// the number of frames. The cost of a single solve of all data is assumed to be proportional to N.
+/// The total cost of a solve at every frame is assumed to be proportional to N^2. Returns nullopt
+/// if the source does not report N, or if the run failed.
 std::optional<PredictedCpuTime> PredictCpuTime(Experiment& experiment);
 
 }  // namespace alidade::internal

@@ -36,8 +36,8 @@ std::string FolderName(const ComparedRun& run) {
 }
 
 /// Moves the estimators out of the runs. If there are several runs, the folder of the run is
-/// prefixed to the name of each estimator. The prefix is the name of the folder if it is unique,
-/// otherwise the path.
+/// prefixed to the name of each estimator. The prefix is the name of the folder if this name is
+/// unique, otherwise the path of the folder.
 std::vector<Candidate> ExtractCandidates(std::vector<ComparedRun>& runs) {
   std::vector<Candidate> candidates;
   for (ComparedRun& run : runs) {
@@ -53,19 +53,20 @@ std::vector<Candidate> ExtractCandidates(std::vector<ComparedRun>& runs) {
   return candidates;
 }
 
-/// Returns the first candidate with the name that an option specifies. Error: kUsage.
+/// Returns the first candidate with the name that an option specifies. Error: kUsage if no
+/// candidate has this name.
 const Candidate& FindNamed(const std::string& name, const std::vector<Candidate>& candidates,
                            const char* option) {
   for (const Candidate& candidate : candidates) {
     if (candidate.name == name || candidate.result.name == name) return candidate;
   }
-  internal::RefuseOption(option, "no estimator '" + name + "'", name,
+  internal::RefuseOption(option, "no estimator has the name '" + name + "'", name,
                          internal::NamesOf(candidates));
 }
 
-/// Returns the first usable candidate that satisfies the predicate. If all candidates that satisfy
-/// it are unusable, returns the first of these. Returns null if no candidate satisfies the
-/// predicate.
+/// Returns the first usable candidate that satisfies the predicate. If no such candidate is usable,
+/// returns the first unusable candidate that satisfies the predicate. Returns null if no candidate
+/// satisfies the predicate.
 const Candidate* FindFirst(const std::vector<Candidate>& candidates,
                            const std::function<bool(const Candidate&)>& predicate) {
   const Candidate* first = nullptr;
@@ -77,10 +78,11 @@ const Candidate* FindFirst(const std::vector<Candidate>& candidates,
   return first;
 }
 
-/// Finds the batch that is the reference of `estimator`: the batch of all data if `smoothed`,
-/// otherwise the batch of the data up to each frame. A batch of all measurements has priority over
-/// a batch of the measurements that a filter accepted. If no batch of the same problem is usable, a
-/// usable batch with the same sensors but other overrides (for example a robust loss) is returned.
+/// Finds the batch that is the reference of `estimator`. If `smoothed` is true, this is the batch
+/// of all data, otherwise the batch of the data up to each frame. A batch of all measurements has
+/// priority over a batch of the measurements that a filter accepted. If no batch of the same
+/// problem is usable, returns a usable batch that has the same sensors but other overrides, for
+/// example a robust loss.
 const Candidate* FindBatch(const Candidate& estimator, const std::vector<Candidate>& candidates,
                            bool smoothed) {
   const auto has_same_sensors = [&](const Candidate& candidate) {
@@ -167,12 +169,14 @@ std::string WithheldReason(const std::vector<Candidate>& candidates,
       if (reference == nullptr) continue;
       has_reference = true;
       if (reference->is_usable()) continue;
-      return "no reference: estimator '" + reference->name + "' " +
+      return "no reference is available: estimator '" + reference->name + "' " +
              (reference->result.failed ? "failed" : "has no estimates") +
-             ", the comparison with it is withheld";
+             ", so the comparison with this estimator is withheld";
     }
   }
-  return has_reference ? "" : "no reference: no truth, no batch and no smoother of all data";
+  return has_reference
+             ? ""
+             : "no reference is available: there is no truth, no batch and no smoother of all data";
 }
 
 /// Returns notes on the estimators without a reference if other estimators have a reference.
@@ -206,7 +210,8 @@ void AddAll(const std::map<std::string, double>& source, const std::string& kind
   for (const auto& [key, value] : source) values[kind + key] = SingleValue(value);
 }
 
-/// Adds the ratios to the reference. Only some metrics of a section have a ratio.
+/// Adds the ratio of each metric in `section` to the same metric of the reference. Some metrics do
+/// not have a ratio.
 void AddRatios(const Candidate& estimator, const Candidate& reference, MetricSection section,
                std::map<std::string, Ratio>& ratios) {
   for (const auto& [text, value] : estimator.result.metrics) {
@@ -219,8 +224,8 @@ void AddRatios(const Candidate& estimator, const Candidate& reference, MetricSec
   }
 }
 
-/// Adds the distance from `reference` over the run. If the scale is unobservable, it also adds the
-/// distance of the aligned trajectories.
+/// Adds the distance from `reference` over the run. If the scale is unobservable, the function also
+/// adds the distance between the aligned trajectories.
 void AddRmsd(const Candidate& estimator, const Candidate& reference, ComparedEstimator& compared) {
   const Distance distance = internal::DistanceBetween(estimator.series, reference.series);
   AddAll(distance.rms, "rmsd:", compared.values);
@@ -303,7 +308,8 @@ ComparedEstimator Compare(const Candidate& estimator, const References& referenc
   return compared;
 }
 
-/// Returns the filter whose error is decomposed. Returns null if there is no filter. Error: kUsage.
+/// Returns the filter whose error is decomposed. Returns null if there is no filter. Error: kUsage
+/// if `options` contains the name of a filter that does not exist.
 const Candidate* FindFilter(const std::vector<Candidate>& candidates,
                             const CompareOptions& options) {
   const auto is_filter = [](const Candidate& candidate) {
@@ -332,8 +338,8 @@ std::vector<std::string> NotesOf(const std::vector<Candidate>& candidates,
   std::set<std::string> notes;
   if (std::ranges::any_of(candidates, ScaleIsUnobservable)) {
     notes.insert(
-        "the scale is unobservable and depends on the priors: compare trajectories and maps by "
-        "their Sim3 rows, after alignment by a similarity");
+        "the scale is unobservable and depends on the priors: to compare trajectories and maps, "
+        "use the rows with Sim3, which are computed after alignment by a similarity");
   }
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Candidate* const along = references[i].along;
@@ -344,13 +350,14 @@ std::vector<std::string> NotesOf(const std::vector<Candidate>& candidates,
           "' has no covariance.bin: RMSD in sigmas ignores the correlations of the errors");
     }
     if (!truth && along->result.smoothed && !candidates[i].result.smoothed) {
-      notes.insert("'" + along->name +
-                   "' also uses later data, so the estimates of a filter lag behind");
+      notes.insert("the reference '" + along->name +
+                   "' also uses later data, so its distance from a filter includes the effect of "
+                   "these data");
     }
   }
   for (const Candidate& candidate : candidates) {
     const std::string& reason = candidate.errors.no_bound_reason;
-    if (!reason.empty()) notes.insert("no Cramer-Rao bound: " + reason);
+    if (!reason.empty()) notes.insert("the Cramer-Rao bound is not available: " + reason);
   }
   std::vector<std::string> list(notes.begin(), notes.end());
   const std::vector<std::string> missing = NotesOnMissingReferences(candidates, references);
@@ -362,18 +369,19 @@ std::vector<std::string> NotesOf(const std::vector<Candidate>& candidates,
 
 void internal::RefuseOption(const char* option, const std::string& message, const std::string& name,
                             const std::vector<std::string>& choices) {
-  throw Error(ExitCode::kUsage,
-              ErrorLine({}, option, message,
-                        choices.empty() ? "a config that defines one" : "one of " + Join(choices),
-                        Nearest(name, choices)));
+  throw Error(ExitCode::kUsage, ErrorLine({}, option, message,
+                                          choices.empty() ? "a config with such an estimator"
+                                                          : "one of " + Join(choices),
+                                          Nearest(name, choices)));
 }
 
 void internal::RefuseFilter(const std::string& name, bool is_estimator,
                             const std::vector<std::string>& filters) {
   const std::string quoted = "'" + name + "'";
-  RefuseOption("--filter",
-               is_estimator ? quoted + " is not an online filter" : "no estimator " + quoted,
-               is_estimator ? "" : name, filters);
+  RefuseOption(
+      "--filter",
+      is_estimator ? quoted + " is not an online filter" : "no estimator has the name " + quoted,
+      is_estimator ? "" : name, filters);
 }
 
 const char* ToString(DecompositionKind kind) {
@@ -408,8 +416,8 @@ Comparison internal::CompareRuns(std::vector<ComparedRun> runs, const CompareOpt
     if (filter->had_rejection_recovery) {
       comparison.notes.push_back(
           "'" + filter->name +
-          "' recovered from rejections: the steps to a batch or smoother include the cost of the "
-          "recovery");
+          "' recovered from consecutive rejections: the steps to a batch or smoother include the "
+          "cost of this recovery");
     }
   }
   return comparison;

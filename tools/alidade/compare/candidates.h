@@ -15,8 +15,8 @@ bool HaveSameSensors(const EstimatorResult& a, const EstimatorResult& b);
 /// Returns true if both estimators use the same models and sensors.
 bool HaveSameProblem(const EstimatorResult& a, const EstimatorResult& b);
 
-/// Returns true if every estimate uses all data. For a sliding window it is false: an estimate uses
-/// later data only within the window.
+/// Returns true if every estimate uses all data. Returns false for a sliding window, whose
+/// estimates use later data only within the window.
 inline bool SmoothsAllData(const EstimatorResult& result) {
   return result.smoothed && result.kind != EstimatorKind::kSlidingWindow;
 }
@@ -38,8 +38,8 @@ std::map<std::string, double> DistanceBetweenMaps(const EstimatorResult& map,
 /// Compares the estimators of runs over the same data. Error: kUsage.
 Comparison CompareRuns(std::vector<ComparedRun> runs, const CompareOptions& options);
 
-/// Computes the steps from `filter` to the batch of all data. If an estimator of a step is missing,
-/// the step contains the reason instead of values.
+/// Computes the steps of the decomposition from `filter` to the batch of all data. If an estimator
+/// of a step is missing, the step contains the reason instead of values.
 std::vector<DecompositionStep> Decompose(const Candidate& filter,
                                          const std::vector<Candidate>& candidates, bool with_truth);
 

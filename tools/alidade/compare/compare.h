@@ -12,29 +12,30 @@
 #include "alidade/experiment/run.h"
 #include "alidade/sweep/sweep.h"
 
-/// Comparison of estimators over the same data, and decomposition of their differences
+/// Comparison of estimators over the same data, and decomposition of the differences between them
 /// (docs/compare.md). The reference of each estimator is a batch of the same data. A filter uses
-/// past data only, so it is not compared with a smoother of all data.
+/// past data only, so over the run it is not compared with a smoother of all data.
 namespace alidade {
 
 /// Options of a comparison.
 struct CompareOptions {
-  /// Reference of the errors: `truth`, or the name of an estimator. If it is empty, the reference
-  /// is truth if it is known, otherwise the batch.
+  /// Reference of the errors: `truth`, or the name of an estimator. If this option is empty, the
+  /// reference is truth if truth is known, otherwise the batch.
   std::string reference;
-  std::string filter;  ///< the filter whose error is decomposed; "": the first filter
+  std::string filter;  ///< name of the filter whose error is decomposed; "": the first filter
   /// True: the error decomposition is computed, and missing estimators are added to the config.
   bool decompose = true;
-  /// True: the comparison is over several seeds. The source is read once for each seed.
+  /// True: the comparison is over several seeds, and the source is read once for each seed.
   bool over_seeds = false;
-  /// Time budget, s. Over seeds, a run other than the first is not started if it would end after
-  /// the budget (wall clock). For a single run, the CPU time of each estimator is predicted from
-  /// the first frames. An estimator is not added if the sum of these times would exceed the budget.
+  /// Time budget, s. Over seeds, the budget limits the wall-clock time. A run other than the first
+  /// is not started if it would probably exceed the budget. For a single run, the budget limits the
+  /// CPU time, which is predicted for each estimator from the first frames. An estimator is not
+  /// added if the sum of the predicted times would exceed the budget.
   std::optional<double> budget_s = {};
 };
 
-/// One estimator of a comparison. The values are the metrics of run.json, if these are relative to
-/// truth, and the following:
+/// One estimator of a comparison. The values include the metrics of run.json. Metrics that need
+/// truth are included only if the errors are relative to truth. The other values are:
 ///
 ///   rmsd:BLOCK                     sqrt(mean |d|^2), d = x (-) x_ref      unit of the block
 ///   final_difference:BLOCK         |d| at the last timestamp
@@ -43,9 +44,10 @@ struct CompareOptions {
 ///   trajectory.sim3.rmsd           RMSD of the trajectory after alignment by a similarity, m
 ///   map.rmsd                       RMSD of the landmark positions at the end, m
 ///   map.sim3.rmsd                  map.rmsd after alignment of the map by a similarity, m
-///   time_us                        wall-clock time for each measurement
-///   cpu_us                         CPU time for each frame; for a batch, without cpu_us.start
-///   cpu_us.start                   CPU time of the filter from which a batch starts
+///   time_us                        wall-clock time for each measurement, us
+///   cpu_us                         CPU time for each frame, us; excludes cpu_us.start
+///   cpu_us.start                   CPU time for each frame of the filter from which a batch
+///                                  starts, us
 struct ComparedEstimator {
   std::string name, type;
   bool smoothed = false;        ///< true: the estimates also use later data
@@ -54,11 +56,12 @@ struct ComparedEstimator {
   /// Number of used runs in which the reference exists.
   std::int64_t reference_runs = 0, final_reference_runs = 0;
   std::map<std::string, Spread> values;
-  /// Ratios of rmse, final_error and map to those of the reference, by key. For an online estimator
-  /// over seeds also `mse_by_bound:BLOCK`, the mean of |e|^2 / tr P, P the Cramer-Rao bound.
+  /// Ratio of each rmse, final_error and map error to the same error of the reference, by key. For
+  /// an online estimator over seeds, the map also contains `mse_by_bound:BLOCK`, the mean of |e|^2
+  /// / tr P, with the Cramer-Rao bound P.
   std::map<std::string, Ratio> ratios;
   std::map<std::string, std::string> units;  ///< units of blocks
-  std::int64_t used = 0;                     ///< number of runs that the values use
+  std::int64_t used = 0;                     ///< number of runs from which the values are computed
   std::int64_t diverged = 0;                 ///< number of runs in which the estimator diverged
   ErrorSeries series;                        ///< errors, if the run is one of several seeds
   OverTime over_time;                        ///< averages over several runs
@@ -84,10 +87,10 @@ const char* ToString(DecompositionKind kind);
 struct DecompositionStep {
   DecompositionKind kind = DecompositionKind::kLinearisation;
   std::string estimator, reference;  ///< names of the two estimators
-  bool at_end = false;  ///< true: values of the last frame; there is no full-information filter
+  bool at_end = false;               ///< true: the values are those of the last frame
   std::map<std::string, Spread> values;
-  std::map<std::string, Ratio>
-      ratios;            ///< `rmse:BLOCK` of `estimator` / `rmse:BLOCK` of `reference`
+  /// `rmse:BLOCK` of `estimator` / `rmse:BLOCK` of `reference`.
+  std::map<std::string, Ratio> ratios;
   std::string withheld;  ///< reason why there are no values, or ""
 };
 
@@ -95,12 +98,12 @@ struct DecompositionStep {
 struct Comparison {
   std::int64_t runs = 1;  ///< number of seeds
   std::int64_t frames = 0;
-  RunStatus status = RunStatus::kOk;  ///< worst status of the runs; over seeds kOk or kStopped
+  RunStatus status = RunStatus::kOk;  ///< worst status of the runs; over seeds, kOk or kStopped
   std::string reference;              ///< `truth`, or the name of the first reference estimator
   std::string withheld;               ///< reason for a missing reference or comparison, or ""
   std::string measurements_sha256;    ///< hash of the data; "" for several seeds
   std::vector<ComparedEstimator> estimators;
-  std::string decomposed;  ///< the filter whose error is decomposed
+  std::string decomposed;  ///< name of the filter whose error is decomposed
   std::vector<DecompositionStep> decomposition;
   std::vector<std::string> notes;  ///< notes for the reader, each a single line
 };
@@ -109,9 +112,9 @@ struct Comparison {
 struct ComparedExperiment {
   Config config;  ///< config with the added estimators
   Experiment experiment;
-  std::string filter;              ///< filter whose error is decomposed; "": no filter
+  std::string filter;              ///< name of the filter whose error is decomposed, or ""
   std::vector<std::string> added;  ///< names of the added estimators
-  std::vector<std::string> notes;  ///< added estimators; estimators left out, with the reason
+  std::vector<std::string> notes;  ///< notes on the added and the omitted estimators
   /// Note for steps that lack an estimator because of the budget. It is empty if the budget does
   /// not exclude an estimator.
   std::string beyond_budget = {};
@@ -119,8 +122,8 @@ struct ComparedExperiment {
 
 /// Builds the experiment of a config and adds the estimators that the comparison needs: the batch
 /// of all data, the full-information filter, the batch of the accepted measurements, and the
-/// smoother. Each of these has the sensors, overrides and steps of the filter. An estimator is left
-/// out if it does not support the problem, or if it would exceed the budget of a single run.
+/// smoother. Each added estimator has the sensors, overrides and steps of the filter. An estimator
+/// is omitted if it does not support the problem, or if it would exceed the budget of a single run.
 /// Errors: those of BuildExperiment(); kUsage if an estimator in `options` does not exist, or if
 /// `options.filter` is not an online filter.
 ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHost& host,
@@ -129,8 +132,8 @@ ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHos
 /// Observer that compares the estimators of a run.
 class RunComparer : public RunObserver {
  public:
-  /// Adds a CPU clock to each estimator of the experiment. If `over_seeds`, the run is one of
-  /// several seeds, and the errors at each timestamp are recorded.
+  /// Adds a CPU clock to each estimator of the experiment. If `over_seeds` is true, the run is one
+  /// of several seeds, and the errors at each timestamp are recorded.
   explicit RunComparer(Experiment& experiment, bool over_seeds = false);
   ~RunComparer() override;
   RunComparer(const RunComparer&) = delete;
@@ -161,7 +164,7 @@ struct ComparedSeeds {
   std::int64_t beyond_budget = 0;  ///< number of runs that the budget excludes
 };
 /// Runs a config once for each seed, and compares the estimators. The values of an estimator
-/// exclude the runs in which that estimator diverged. Errors: those of Sweep and of RunComparer.
+/// exclude the runs in which this estimator diverged. Errors: those of Sweep and of RunComparer.
 ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost& host,
                            const SweepOptions& sweep, const CompareOptions& options);
 
@@ -170,15 +173,17 @@ ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost&
 Comparison Summarise(const std::vector<Comparison>& comparisons);
 
 /// Writes report.html of a comparison over several seeds, the figures of errors, average NEES and
-/// cost, and their csv files (docs/compare.md). Returns the reason if figures are missing, or "".
-/// `stop` ends the drawing. Errors: kCannotCreate, kIo.
+/// cost, and the csv files of these figures (docs/compare.md). Returns the reason why figures are
+/// missing, or "" if none is missing. The drawing ends when `stop` returns true. Errors:
+/// kCannotCreate, kIo.
 std::string WriteSeedReport(const internal::OutputFolder& folder, const Comparison& comparison,
                             const Config& config, const std::function<bool()>& stop);
 
 /// Format of a report.
 enum class TableStyle { kText, kMarkdown, kLatex, kHtml };
 /// Rows of the tables: all rows, or the main rows and the number of omitted rows. The main rows are
-/// errors, their ratios, NEES and the wall-clock time. Without truth, differences replace errors.
+/// errors, ratios of errors, NEES and the wall-clock time. Without truth, differences replace
+/// errors.
 enum class ReportRows { kAll, kMain };
 /// Formats the tables and the error decomposition.
 std::string CompareReport(const Comparison& comparison, TableStyle style,

@@ -18,8 +18,8 @@ struct RunComparer::Impl {
   ComparedRun run;
   internal::DataHash data;
   std::vector<std::shared_ptr<internal::CpuTime>> clocks = {};
-  std::vector<internal::ErrorRecorder> errors =
-      {};  ///< empty if the run is not one of several seeds
+  /// Recorder of each estimator; empty if the run is not one of several seeds.
+  std::vector<internal::ErrorRecorder> errors = {};
 };
 
 RunComparer::RunComparer(Experiment& experiment, bool over_seeds)
@@ -77,8 +77,9 @@ Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
   std::set<std::filesystem::path> distinct;
   for (const auto& folder : folders) {
     if (distinct.insert(std::filesystem::weakly_canonical(folder)).second) continue;
-    throw Error(ExitCode::kUsage, ErrorLine(Place{folder.string()}, {}, "is given twice",
-                                            "folders of different runs"));
+    throw Error(ExitCode::kUsage,
+                ErrorLine(Place{folder.string()}, {}, "this folder is given twice",
+                          "folders of different runs"));
   }
   std::vector<ComparedRun> runs;
   for (const auto& folder : folders) runs.push_back(internal::ReadRun(folder));
@@ -89,10 +90,12 @@ Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
       notes.push_back("'" + (run.folder / candidate.result.name / "estimates.csv").string() +
                       "': " + std::to_string(candidate.not_finite_rows) + " of " +
                       std::to_string(candidate.series.timestamps.size()) +
-                      " rows have values that are not finite; the comparison ignores them");
+                      " rows contain values that are not finite; the comparison ignores these "
+                      "values");
     }
     if (run.status == RunStatus::kOk) continue;
-    notes.push_back("'" + run.folder.string() + "' " + ToString(run.status) + ": " + run.reason);
+    notes.push_back("the run in '" + run.folder.string() + "' " + ToString(run.status) + ": " +
+                    run.reason);
   }
   Comparison comparison = internal::CompareRuns(std::move(runs), options);
   comparison.notes.insert(comparison.notes.begin(), notes.begin(), notes.end());
@@ -111,7 +114,8 @@ ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost&
     RunComparer comparer(experiment, true);
     RunOptions observed = original;
     observed.observers.push_back(&comparer);
-    observed.stop = stopped;  // a run that has started is finished, because the budget includes it
+    // The budget does not stop a started run, because the time of this run is part of the budget.
+    observed.stop = stopped;
     const double start_s = budget.elapsed_s();
     RunResult result = sweep.run ? sweep.run(experiment, observed) : Run(experiment, observed);
     budget.RecordRun(budget.elapsed_s() - start_s);
@@ -135,10 +139,9 @@ ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost&
     seeds.beyond_budget = seeds.sweep.runs - finished;
     seeds.comparison.notes.push_back(
         "the budget of " + internal::RoundedText(*options.budget_s, 3) + " s sufficed for " +
-        std::to_string(finished) + " of " + std::to_string(seeds.sweep.runs) +
-        " runs; not run: seed " +
+        std::to_string(finished) + " of " + std::to_string(seeds.sweep.runs) + " runs; seed " +
         std::to_string(seeds.sweep.first_seed + static_cast<std::uint64_t>(finished)) +
-        " and later seeds");
+        " and the later seeds were not run");
   }
   return seeds;
 }

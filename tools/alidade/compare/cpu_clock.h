@@ -12,12 +12,13 @@ double ThreadCpuSeconds();
 
 /// CPU time of an estimator. Excludes the time for reading the clock.
 struct CpuTime {
-  double frames_s = 0.0;     ///< time for the frames
-  double smoothing_s = 0.0;  ///< time after the last frame; excludes the receiver of the estimates
+  double frames_s = 0.0;  ///< time for processing the frames
+  /// Time for smoothing after the last frame. Excludes the time of the receiver of the estimates.
+  double smoothing_s = 0.0;
 };
 
-/// Returns `estimator` with a clock that adds the CPU time to `time`. The estimates do not change.
-/// A clone of the estimator has no clock.
+/// Wraps `estimator` in an estimator that measures the CPU time and adds it to `time`. The
+/// estimates do not change. A clone does not measure the CPU time.
 std::unique_ptr<Estimator> WithCpuClock(std::unique_ptr<Estimator> estimator,
                                         std::shared_ptr<CpuTime> time);
 

@@ -10,11 +10,11 @@ namespace {
 
 /// Estimators between which the steps are computed. A pointer is null if the estimator is missing.
 struct StepEstimators {
-  const Candidate* full_information = nullptr;  ///< the full-information filter
-  const Candidate* smoother =
-      nullptr;  ///< smoother with the models and linearisation of the filter
-  const Candidate* accepted = nullptr;  ///< the batch of the accepted measurements
-  const Candidate* all_data = nullptr;  ///< the batch of all data
+  const Candidate* full_information = nullptr;  ///< full-information filter
+  /// Smoother with the models and the linearisation of the filter.
+  const Candidate* smoother = nullptr;
+  const Candidate* accepted = nullptr;  ///< batch of the accepted measurements
+  const Candidate* all_data = nullptr;  ///< batch of all data
 };
 
 StepEstimators FindStepEstimators(const Candidate& filter,
@@ -34,8 +34,8 @@ StepEstimators FindStepEstimators(const Candidate& filter,
     }
     if (!candidate.is_batch()) continue;
     if (result.smoothed) select(by_filter ? found.accepted : found.all_data, candidate);
-    // A full-information filter of the accepted measurements is preferred, because another step
-    // covers the rejected measurements.
+    // A full-information filter of the accepted measurements is preferred, because the effect of
+    // the rejected measurements is a separate step.
     const bool is_better = by_filter && candidate.is_usable() &&
                            found.full_information != nullptr &&
                            found.full_information->result.accepted_by.empty();
@@ -45,8 +45,9 @@ StepEstimators FindStepEstimators(const Candidate& filter,
   return found;
 }
 
-/// Returns the subject of an error metric: BLOCK of `rmse:BLOCK`. If `at_end`, the subject is BLOCK
-/// of `final_error:BLOCK`, `map` or `map.sim3`. Returns "" if a step does not compare the metric.
+/// Returns the subject of an error metric. The subject is BLOCK for `rmse:BLOCK`. If `at_end` is
+/// true, the subject is BLOCK for `final_error:BLOCK`, `map` or `map.sim3`. Returns "" if a step
+/// does not compare the metric.
 std::string SubjectOf(const std::string& metric, bool at_end) {
   if (at_end && metric == "map.rmse") return "map";
   if (at_end && metric == "map.sim3.rmse") return "map.sim3";
@@ -82,7 +83,8 @@ DecompositionStep ComputeStep(DecompositionKind kind, const Candidate* start, co
     return step;
   }
   for (const Candidate* const candidate : {start, end}) {
-    if (!candidate->is_usable()) step.withheld = "'" + candidate->name + "' failed";
+    if (!candidate->is_usable())
+      step.withheld = "'" + candidate->name + "' failed or has no estimates";
   }
   if (!step.withheld.empty()) return step;
   const Distance distance = DistanceBetween(start->series, end->series);
@@ -102,9 +104,9 @@ DecompositionStep ComputeStep(DecompositionKind kind, const Candidate* start, co
   return step;
 }
 
-/// Compares the filter with the full-information filter. If that is missing, for example with
-/// landmarks, compares the filter with a batch of all data at the last frame. There, the batch
-/// equals the full-information filter.
+/// Compares the filter with the full-information filter. If no full-information filter exists, for
+/// example with landmarks, compares the filter with a batch at the last frame. At that frame, the
+/// batch equals the full-information filter.
 DecompositionStep LinearisationStep(const Candidate& filter, const StepEstimators& estimators,
                                     bool with_truth) {
   const bool has_accepted = estimators.accepted != nullptr && estimators.accepted->is_usable();
@@ -112,7 +114,9 @@ DecompositionStep LinearisationStep(const Candidate& filter, const StepEstimator
   const bool at_end = estimators.full_information == nullptr && batch != nullptr;
   return ComputeStep(DecompositionKind::kLinearisation, &filter,
                      at_end ? batch : estimators.full_information, with_truth,
-                     "there is no full-information filter, {type: BATCH, mode: filtering}", at_end);
+                     "this step needs a full-information filter: add a batch estimator with `mode: "
+                     "filtering` to the config",
+                     at_end);
 }
 
 }  // namespace
@@ -163,12 +167,12 @@ std::vector<DecompositionStep> Decompose(const Candidate& filter,
       : estimators.accepted != nullptr ? estimators.accepted
                                        : estimators.all_data,
       with_truth,
-      "there is neither a smoother, {type: rts}, nor a batch of all data with a "
-      "full-information filter"));
+      "this step needs a smoother, or a full-information filter and a batch of all data: add an "
+      "estimator with `type: rts` to the config"));
   steps.push_back(ComputeStep(
       DecompositionKind::kRejected, estimators.accepted, estimators.all_data, with_truth,
-      "the batch of all data or the batch of the accepted measurements is missing, "
-      "{type: BATCH, use: {accepted_by: FILTER}}"));
+      "this step needs two batch estimators, one with all data and one with `use: {accepted_by: "
+      "FILTER}`: add the missing estimator to the config"));
   const std::int64_t count = filter.measurements(), used = filter.used();
   steps.back().values["measurements"] = SingleValue(static_cast<double>(count));
   steps.back().values["rejected"] = SingleValue(static_cast<double>(count - used));

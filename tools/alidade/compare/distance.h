@@ -18,7 +18,7 @@ struct Distance {
   /// sqrt(mean d' P_ref^-1 d / dof) of each owner, in standard deviations of the reference.
   /// Timestamps with a singular P_ref are skipped.
   std::map<std::string, double> sigmas;
-  std::map<std::string, double> final_sigmas;  ///< value of each owner at the last timestamp
+  std::map<std::string, double> final_sigmas;  ///< the same ratio at the last timestamp
 };
 
 /// Computes the distance between two series. Two blocks correspond if they have the same name and

@@ -95,8 +95,8 @@ void ErrorRecorder::Add(const SourceFrame& frame, const State& state) {
     bound_.reset();
     series_.bounds.clear();
     series_.no_bound_reason =
-        "the truth of a block or landmark is missing at a timestamp, or a model is not defined "
-        "there";
+        "at one of the timestamps, the truth of a block or landmark is missing, or a model is not "
+        "defined";
   }
   if (count_++ % stride_ == 0) AppendTimestamp(frame.timestamp, state);
 }

@@ -12,9 +12,9 @@
 
 namespace alidade::internal {
 
-/// Recorder of the errors of one estimator during a run. For an online estimator it also records
-/// the CramerRaoBound, a lower bound of the mean square error of any online estimator. In a long
-/// run it retains only every n-th timestamp, n a power of two, to limit the memory.
+/// Recorder of the errors of one estimator during a run. For an online estimator, the recorder also
+/// records the CramerRaoBound, a lower bound of the mean square error of any online estimator. To
+/// limit the memory in a long run, only every n-th timestamp is retained, with n a power of two.
 class ErrorRecorder {
  public:
   static constexpr std::size_t kMaxTimestamps = 2048;
@@ -33,9 +33,9 @@ class ErrorRecorder {
     double truth_variance;
     Eigen::VectorXd error = {};
     bool has_error = false;
-    double bound = 0.0;            ///< tr P, P the bound of the block
+    double bound = 0.0;            ///< trace of the bound P of the block
     double sum_by_bound = 0.0;     ///< sum of |e|^2 / tr P over the timestamps with both values
-    std::int64_t bound_count = 0;  ///< number of these timestamps
+    std::int64_t bound_count = 0;  ///< number of timestamps in the sum
   };
 
   /// Updates the bound. Returns false if the bound is undefined from this frame on.

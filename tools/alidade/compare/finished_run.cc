@@ -30,15 +30,16 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 }
 
 [[noreturn]] void FailOpen(const fs::path& file) {
-  throw Error(ExitCode::kInputMissing, ErrorLine(Place{file.string()}, {}, "cannot be read",
-                                                 "the folder of a finished run"));
+  throw Error(ExitCode::kInputMissing,
+              ErrorLine(Place{file.string()}, {}, "the file cannot be read",
+                        "the folder of a finished run"));
 }
 
-/// Refuses a folder, a device and a pipe. Reading from a pipe could block the program.
+/// Refuses a path that is not a regular file. Reading from a pipe could block the program.
 void RequireFile(const fs::path& file) {
   std::error_code error;
   if (!fs::exists(file, error)) FailOpen(file);
-  if (!fs::is_regular_file(file, error)) FailFile(file, 0, "is not a regular file");
+  if (!fs::is_regular_file(file, error)) FailFile(file, 0, "this is not a regular file");
 }
 
 std::ifstream Open(const fs::path& file) {
@@ -51,7 +52,7 @@ std::ifstream Open(const fs::path& file) {
 Json ReadJson(const fs::path& file) {
   constexpr std::uintmax_t kMaxBytes = 1 << 28;
   RequireFile(file);
-  if (fs::file_size(file) > kMaxBytes) FailFile(file, 0, "is larger than 256 MiB");
+  if (fs::file_size(file) > kMaxBytes) FailFile(file, 0, "the file is larger than 256 MiB");
   const std::string text = ReadFile(
       file, [&](ExitCode, int) { FailOpen(file); }, kMaxBytes);
   return ParseJson(text, file.string());
@@ -71,7 +72,7 @@ std::vector<double> NumbersOf(std::string_view row, const fs::path& file, int li
     const char* const last = row.data() + end;
     const auto [parsed_end, error] = std::from_chars(row.data() + begin, last, value);
     if (end > begin && (error != std::errc() || parsed_end != last))
-      FailFile(file, line, "not a number");
+      FailFile(file, line, "a cell is not a number");
     numbers.push_back(value);
     begin = end + 1;
   }
@@ -94,7 +95,7 @@ struct EstimateCells {
   std::vector<std::size_t> values, sigmas;
 };
 
-/// Finds the columns of the blocks with the help of `columns.json`.
+/// Finds the columns of the blocks. `columns` is the entry of estimates.csv in columns.json.
 EstimateCells FindCells(const JsonNode& columns, const std::vector<SeriesBlock>& blocks,
                         const fs::path& file) {
   EstimateCells cells;
@@ -106,7 +107,7 @@ EstimateCells FindCells(const JsonNode& columns, const std::vector<SeriesBlock>&
                           std::vector<std::size_t>& list) {
     const std::vector<std::size_t>& places = found[{block.name, quantity}];
     if (std::ssize(places) != size) {
-      FailFile(file, 0, "the columns of block '" + block.name + "' differ from run.json");
+      FailFile(file, 0, "the columns of block '" + block.name + "' do not match run.json");
     }
     list.insert(list.end(), places.begin(), places.end());
   };
@@ -122,8 +123,8 @@ void AppendRow(Series& series, const EstimateCells& cells, const std::vector<dou
   for (const std::size_t cell : cells.sigmas) series.covariances.push_back(row[cell] * row[cell]);
 }
 
-/// Reads estimates.csv. Returns the number of rows that contain a value that is not finite. An
-/// empty cell, which represents a missing value, does not count.
+/// Reads estimates.csv. Returns the number of rows with nan or inf. An empty cell represents a
+/// missing value and does not count.
 std::int64_t ReadEstimates(const fs::path& file, const EstimateCells& cells, std::int64_t rows,
                            Series& series) {
   std::int64_t not_finite = 0;
@@ -141,14 +142,14 @@ std::int64_t ReadEstimates(const fs::path& file, const EstimateCells& cells, std
   }
   if (std::ssize(series.timestamps) != rows) {
     FailFile(file, 0,
-             "has " + std::to_string(series.timestamps.size()) + " rows, but run.json records " +
-                 std::to_string(rows));
+             "the file has " + std::to_string(series.timestamps.size()) +
+                 " rows, but run.json records " + std::to_string(rows) + " rows");
   }
   return not_finite;
 }
 
-/// Reads the joint covariances P if the file exists and P is not too large. They replace the
-/// variances of the series.
+/// Reads the joint covariances P if the file exists and P is not too large. The covariances replace
+/// the variances of the series.
 void ReadCovariances(const fs::path& file, Series& series) {
   if (series.tangent() > Series::kMaxJoint || !fs::exists(file)) return;
   series.joint = true;
@@ -214,7 +215,7 @@ EstimatorResult ReadResult(const std::string& name, const JsonNode& entry) {
   return result;
 }
 
-/// Reads the landmarks of the final state. Skips landmarks that were removed before.
+/// Reads the landmarks of the final state. Skips landmarks that were removed during the run.
 std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
   constexpr const char* kAxes[] = {"x", "y", "z"};
   RequireFile(file);
@@ -224,10 +225,11 @@ std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
   rows.Next();
   for (std::size_t i = 0; i < rows.size(); ++i) columns.emplace(rows.text(i), i);
   for (const char* name : {"id", "generation", "x", "y", "z", "status"}) {
-    if (!columns.contains(name)) FailFile(file, 1, std::string("no column '") + name + "'");
+    if (!columns.contains(name))
+      FailFile(file, 1, std::string("the column '") + name + "' is missing");
   }
   while (rows.Next()) {
-    if (rows.size() < columns.size()) FailFile(file, rows.line(), "there are too few columns");
+    if (rows.size() < columns.size()) FailFile(file, rows.line(), "the row has too few columns");
     if (rows.text(columns.at("status")) == "removed") continue;
     LandmarkEstimate& landmark = map.emplace_back();
     landmark.id = rows.Index(columns.at("id"), "id");
@@ -267,14 +269,14 @@ ComparedRun ReadRun(const fs::path& folder) {
   const fs::path run_file = folder / "run.json", timing_file = folder / "timing.json";
   if (fs::exists(folder / "sweep.json")) {
     throw Error(ExitCode::kBadData,
-                ErrorLine(Place{folder.string()}, {}, "is the folder of a sweep",
+                ErrorLine(Place{folder.string()}, {}, "this is the folder of a sweep",
                           "folders that `alidade run` has written"));
   }
   const Json run_json = ReadJson(run_file);
   const JsonNode root(run_json, run_file.string());
   if (root.At("status").Text() == "running") {
     throw Error(ExitCode::kBadData,
-                ErrorLine(Place{folder.string()}, {}, "is incomplete", "a finished run"));
+                ErrorLine(Place{folder.string()}, {}, "the run is not finished", "a finished run"));
   }
   const Json timing_json = ReadJson(timing_file);
   const JsonNode timing(timing_json, timing_file.string());
@@ -286,7 +288,7 @@ ComparedRun ReadRun(const fs::path& folder) {
   run.reference = root.At("reference").Text();
   run.frames = root.At("frames").Count();
   const auto data = root.Find("data");
-  if (!data) FailFile(run_file, 0, "does not record the hashes of the data");
+  if (!data) FailFile(run_file, 0, "the hashes of the data are missing");
   run.measurements_sha256 = data->At("measurements").Text();
   run.truth_sha256 = TextOf(*data, "truth");
   for (const auto& [name, entry] : root.At("estimators").Entries()) {

@@ -19,7 +19,7 @@ struct ComparedRun;
 /// Estimator of a comparison.
 struct Candidate {
   std::string name;                  ///< name in the comparison
-  const ComparedRun* run = nullptr;  ///< the run that contains it
+  const ComparedRun* run = nullptr;  ///< run that contains the estimator
   EstimatorResult result;            ///< result of the estimator, without events
   Series series;
   CpuTime cpu;         ///< CPU time; zero if unknown
@@ -36,7 +36,7 @@ struct Candidate {
   std::int64_t used() const;
 };
 
-/// Run of a comparison, and its estimators.
+/// Run of a comparison, with the estimators of the run.
 struct ComparedRun {
   std::filesystem::path folder;  ///< "": the run has no folder
   RunStatus status = RunStatus::kOk;

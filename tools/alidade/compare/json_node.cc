@@ -91,7 +91,7 @@ double JsonNode::Number() const {
 
 std::size_t JsonNode::Choice(const std::vector<std::string>& choices) const {
   const auto found = std::ranges::find(choices, Text());
-  if (found == choices.end()) FailKind(Join(choices, ", "));
+  if (found == choices.end()) FailKind("one of " + Join(choices, ", "));
   return static_cast<std::size_t>(found - choices.begin());
 }
 

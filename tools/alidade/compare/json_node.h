@@ -11,7 +11,7 @@
 
 namespace alidade::internal {
 
-/// Value in a JSON file, with the file name and the key path for messages; the counterpart of Node.
+/// Value in a JSON file. Stores the file name and the key path for messages, like Node for YAML.
 /// The parsed JSON value must outlive the JsonNode. Errors: kBadData with the file, the key path
 /// and the expected value.
 class JsonNode {

@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-/// Computes quantiles of sum(a_i) / sum(b_i) over random samples. A sample consists of n pairs
-/// (a_i, b_i), which are drawn with replacement.
+/// Computes the 2.5 and 97.5 % quantiles of sum(a_i) / sum(b_i) over random samples. A sample
+/// consists of n pairs (a_i, b_i), which are drawn with replacement.
 Interval Bootstrap(const std::vector<double>& a, const std::vector<double>& b) {
   constexpr int kSamples = 5000;
   constexpr std::uint64_t kSeed = 1;
@@ -36,10 +36,10 @@ Interval Bootstrap(const std::vector<double>& a, const std::vector<double>& b) {
 
 /// Errors and NEES of the runs at one timestamp.
 struct TimestampStatistics {
-  std::vector<std::vector<double>> errors;  ///< |e| of each block and run
-  std::vector<double> bounds;               ///< sum of tr P of each block
-  std::vector<double> nees, dofs;           ///< sums of each owner
-  std::vector<std::int64_t> runs;           ///< number of runs with a NEES of each owner
+  std::vector<std::vector<double>> errors;  ///< for each block: |e| of each run
+  std::vector<double> bounds;               ///< for each block: sum of tr P over the runs
+  std::vector<double> nees, dofs;           ///< for each owner: sums over the runs
+  std::vector<std::int64_t> runs;           ///< for each owner: number of runs with a NEES
   std::int64_t count = 0;                   ///< number of runs
   std::int64_t bound_count = 0;             ///< number of runs with a bound
 };

@@ -18,8 +18,8 @@ namespace alidade {
 struct Ratio {
   double error = 0.0, reference_error = 0.0;
   std::int64_t runs = 1;
-  /// Interval that contains the ratio with probability 0.95, computed by a paired bootstrap over
-  /// the runs. It is nullopt for a single run.
+  /// Interval that contains the ratio with probability 0.95. It is computed by a paired bootstrap
+  /// over the runs. For a single run, it is nullopt.
   std::optional<Interval> interval = {};
 
   double value() const { return error / reference_error; }
@@ -30,12 +30,12 @@ struct Ratio {
 
 /// Computes the ratio of mean errors from the ratios of at least one run, and the interval
 ///
-///   [q(0.025), q(0.975)] of mean(e_i) / mean(r_i),   i drawn n times of 1 .. n with replacement
+///   [q(0.025), q(0.975)] of mean(e_i) / mean(r_i),   i drawn n times from 1 .. n with replacement
 ///
-/// e is the error, r the error of the reference in the same run [Efron1993, ch. 13]. The difficulty
-/// of a run affects both errors and cancels. Equal runs in equal order have equal intervals. With
-/// fewer than about 20 runs, the interval is too narrow by a factor of about sqrt((n - 1) / n). If
-/// the errors are skewed, it is too narrow by a larger factor.
+/// e is the error and r is the error of the reference in the same run [Efron1993, ch. 13]. The
+/// difficulty of a run affects e and r alike and cancels. The same runs in the same order yield the
+/// same interval. With fewer than about 20 runs, the interval is too narrow by a factor of about
+/// sqrt((n - 1) / n). If the errors are skewed, the interval is even narrower.
 Ratio RatioOfMeans(const std::vector<Ratio>& runs);
 
 /// Computes the bootstrap interval of the mean of the values. There is one value for each run.
@@ -63,7 +63,7 @@ struct OverTime {
   struct Error {
     std::vector<double> rms;        ///< sqrt(mean |e|^2) over the runs
     std::vector<double> low, high;  ///< 16 and 84 % quantiles of |e|
-    std::vector<double> bound;      ///< sqrt(mean tr P), P the Cramer-Rao bound; empty if unknown
+    std::vector<double> bound;      ///< sqrt(mean tr P) of the Cramer-Rao bound; empty if unknown
     bool is_angle = false;          ///< true: the unit is rad
   };
   /// Average NEES of one owner [BarShalom2001, sec. 5.4.2]. For a consistent filter
@@ -75,7 +75,7 @@ struct OverTime {
     std::vector<double> mean;       ///< sum of e' C^-1 e / sum of n
     std::vector<double> low, high;  ///< bounds with probability 0.95, chi2(N n) / (N n)
     std::int64_t timestamps = 0;    ///< number of timestamps with a NEES
-    double inside = 0.0;            ///< fraction of these at which the mean is within the bounds
+    double inside = 0.0;            ///< share of these timestamps with the mean in the bounds
   };
 
   std::vector<Timestamp> timestamps;

@@ -59,8 +59,8 @@ const std::vector<Variant>& Variants() {
 }
 
 /// Returns true if `spec` can serve as the variant. A full-information filter of all data can also
-/// serve as the full-information filter of the accepted measurements. Another step of the
-/// decomposition covers the rejected measurements.
+/// serve as the full-information filter of the accepted measurements, because the effect of the
+/// rejected measurements is a separate step of the decomposition.
 bool Matches(const Variant& variant, const EstimatorSpec& spec, const EstimatorSpec& filter,
              int filter_index) {
   const bool full_information = spec.kind == EstimatorKind::kBatch && !spec.estimator->offline();
@@ -82,8 +82,8 @@ std::string UniqueName(const std::string& name, const std::vector<EstimatorSpec>
   return unique;
 }
 
-/// Returns the first estimator type of a kind. Searches the core, then the plugins. Returns "" if
-/// there is no such type.
+/// Returns the first estimator type of the given kind, or "" if there is no such type. The built-in
+/// types have priority over those of plugins.
 std::string TypeOf(EstimatorKind kind, const PluginHost& host) {
   for (const internal::EstimatorType& type : internal::EstimatorTypes()) {
     if (type.kind == kind) return type.name;
@@ -120,8 +120,8 @@ std::string ReasonOf(const Error& error) {
   return separator == reason.npos ? reason : reason.substr(separator + 2);
 }
 
-/// Adds the variant to the experiment. If that fails, adds the description of the variant to
-/// `left_out` under the reason.
+/// Adds the variant to the experiment. If this is not possible, adds the description of the variant
+/// to `left_out`. The key is the reason.
 void AddVariant(const Variant& variant, const PluginHost& host, ComparedExperiment& compared,
                 std::map<std::string, std::vector<std::string>>& left_out) {
   const std::string name = UniqueName(variant.name, compared.experiment.estimators);
@@ -137,7 +137,7 @@ void AddVariant(const Variant& variant, const PluginHost& host, ComparedExperime
                            name, compared.experiment);
     compared.config = extended;
     compared.added.push_back(name);
-    compared.notes.push_back("added '" + name + "': " + variant.description);
+    compared.notes.push_back("estimator '" + name + "' was added: " + variant.description);
   } catch (const Error& error) {
     left_out[ReasonOf(error)].emplace_back(variant.description);
   }
@@ -150,14 +150,14 @@ void CheckReference(const Experiment& experiment, const std::string& name) {
   const bool is_known_truth = name == "truth" && !experiment.source->truths().empty();
   if (name.empty() || is_known_truth || std::ranges::count(names, name) > 0) return;
   if (!experiment.source->truths().empty()) names.emplace_back("truth");
-  internal::RefuseOption(
-      "--reference",
-      name == "truth" ? "the source provides no truth" : "no estimator '" + name + "'", name,
-      names);
+  internal::RefuseOption("--reference",
+                         name == "truth" ? "the source does not provide truth"
+                                         : "no estimator has the name '" + name + "'",
+                         name, names);
 }
 
 /// Returns the index of the filter whose error is decomposed. Returns -1 if there is no filter.
-/// Error: kUsage.
+/// Error: kUsage if `name` is not empty and is not the name of a filter.
 int FindFilter(const Experiment& experiment, const std::string& name) {
   std::vector<std::string> filters;
   for (std::size_t e = 0; e < experiment.estimators.size(); ++e) {
@@ -176,8 +176,8 @@ int FindFilter(const Experiment& experiment, const std::string& name) {
 ComparedExperiment Build(const Config& config, const PluginHost& host,
                          const CompareOptions& options,
                          const std::map<std::string, std::string>& excluded) {
-  // The run computes errors relative to truth. The comparison computes differences from any other
-  // reference.
+  // The run computes errors relative to truth. The comparison computes the differences from other
+  // references.
   Config base = config.Copy();
   if (base.root().is_map() && base.root().Find("reference")) {
     base.Set("reference", "truth", kOrigin);
@@ -214,7 +214,8 @@ ComparedExperiment Build(const Config& config, const PluginHost& host,
     AddVariant(variant, host, compared, left_out);
   }
   for (const auto& [reason, descriptions] : left_out) {
-    compared.notes.push_back("left out " + internal::Join(descriptions, "; ") + ": " + reason);
+    compared.notes.push_back("the comparison omits " + internal::Join(descriptions, "; ") + ": " +
+                             reason);
   }
   CheckReference(compared.experiment, options.reference);
   return compared;
@@ -244,11 +245,12 @@ std::map<std::string, std::string> FindBeyondBudget(ComparedExperiment& compared
       sum_s += prediction->cpu_s[e];
     } else {
       beyond[name] = "the predicted CPU time is " + seconds(prediction->cpu_s[e]) +
-                     ", the budget is " + seconds(budget_s);
+                     ", but the budget is " + seconds(budget_s);
     }
   }
-  note = "predicted from " + std::to_string(prediction->frames) + " of " +
-         std::to_string(prediction->total_frames) + " frames: " + seconds(sum_s) + " of CPU time";
+  note = "the predicted CPU time is " + seconds(sum_s) + ", from the first " +
+         std::to_string(prediction->frames) + " of " + std::to_string(prediction->total_frames) +
+         " frames";
   return beyond;
 }
 
@@ -261,12 +263,12 @@ ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHos
   if (options.over_seeds || !options.budget_s || compared.added.empty()) return compared;
   std::string note;
   const auto beyond = FindBeyondBudget(compared, *options.budget_s, note);
-  compared = Build(config, host, options,
-                   beyond);  // build again, because the prediction has read the source
+  // The experiment is built again, because the prediction has read the source.
+  compared = Build(config, host, options, beyond);
   compared.notes.push_back(note);
   if (!beyond.empty()) {
     compared.beyond_budget = "the budget of " + internal::RoundedText(*options.budget_s, 2) +
-                             " s excludes the estimators that are listed as left out";
+                             " s excludes some of the omitted estimators";
   }
   return compared;
 }

@@ -24,7 +24,7 @@ using internal::TableRow;
 
 namespace {
 
-/// Selection of the rows of one metric, or of the ratios of this metric to the reference.
+/// Selection of the rows of one metric, or of the ratios of this metric to that of the reference.
 struct RowKind {
   std::string metric, label;
   bool is_ratio = false;
@@ -46,7 +46,8 @@ std::string CellOf(double value) {
   return RowsOf(result, "value", "")[0].cells[0];
 }
 
-/// With fewer runs, an interval contains the ratio with less than the nominal probability. By the t
+/// Minimum number of runs for which the interval of a ratio is reliable. With fewer runs, the
+/// interval contains the ratio with less than the nominal probability. According to the t
 /// distribution, the 95 % interval would be 2.7 times as wide for three runs, and 1.2 times as wide
 /// for ten runs.
 constexpr std::int64_t kFewRuns = 10;
@@ -83,8 +84,8 @@ std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKin
   return sorted_rows;
 }
 
-/// Returns rows with the mean, and for several runs with [p05, p95]. The three numbers are
-/// formatted as columns of one table, so all numbers of a row have the same unit.
+/// Returns rows with the mean. For several runs, the rows also contain [p05, p95]. The three
+/// numbers are formatted as columns of one table, so all numbers of a row have the same unit.
 std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool several,
                                  const std::vector<RowKind>& kinds) {
   RunResult result;
@@ -121,8 +122,8 @@ std::vector<std::string> Names(const std::vector<Column>& columns) {
   return names;
 }
 
-/// Adds the references of the columns to a table. If all references are equal, their name is added
-/// to the title, otherwise a row is added.
+/// Adds the references of the columns to a table. If all columns have the same reference, its name
+/// is added to the title. Otherwise a row with the references is added.
 void AppendReferences(const std::vector<std::string>& references, Section& section) {
   std::set<std::string> distinct(references.begin(), references.end());
   distinct.erase("");
@@ -273,8 +274,7 @@ std::string DistancesText(const DecompositionStep& step, double& largest) {
 std::string MeaningOf(DecompositionKind kind) {
   switch (kind) {
     case DecompositionKind::kLinearisation:
-      return "cost of linearising each measurement only once, at the filter's estimate of that "
-             "time";
+      return "cost of linearising each measurement only once, at the filter's current estimate";
     case DecompositionKind::kSmoothing:
       return "gain from later data, which a smoother can use but a filter cannot";
     case DecompositionKind::kRejected:
@@ -288,7 +288,7 @@ std::string DistanceLine(const DecompositionStep& step) {
   double largest = 0.0;
   const std::string distances = DistancesText(step, largest);
   if (distances.empty()) return "";
-  const std::string line = std::string(step.at_end ? "difference" : "RMSD") + " of " +
+  const std::string line = std::string(step.at_end ? "difference" : "RMSD") + " between " +
                            step.estimator + " and " + step.reference + ", in sigmas of " +
                            step.reference + ": " + distances;
   if (step.kind == DecompositionKind::kSmoothing) return line;
@@ -380,14 +380,14 @@ std::vector<std::string> RatioLines(const Comparison& comparison) {
   std::vector<std::string> lines;
   if (has_reference_ratio && comparison.runs == 1) {
     lines.emplace_back(
-        "ratios are from one run and have no confidence interval; --runs N computes one");
+        "the ratios are from one run and have no confidence interval; use --runs N to compute one");
   } else if (has_reference_ratio) {
     lines.push_back(
         "ratio: mean error over the runs / mean error of the reference [95 % interval, paired "
         "bootstrap over the runs]; undecided: the interval includes 1" +
         (comparison.runs < kFewRuns
              ? "; too few runs: with fewer than " + std::to_string(kFewRuns) +
-                   " runs the interval is too narrow to decide"
+                   " runs the interval is too narrow for a decision"
              : std::string()));
   }
   if (has_bound_ratio) {

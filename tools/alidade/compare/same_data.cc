@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 /// Consecutive rows of measurements.csv with equal timestamps.
 struct TimestampRows {
   std::string t_s;                ///< timestamp as in the file; "": the end of the file
-  std::vector<std::string> rows;  ///< sorted by the name of the stream, as for the hash
+  std::vector<std::string> rows;  ///< sorted by the name of the stream, like the hashed rows
 };
 
 /// Reader of measurements.csv that groups the rows by timestamp.
@@ -39,7 +39,8 @@ class MeasurementsFile {
   }
 
  private:
-  /// Reads the next row. Removes trailing empty cells, which belong to wider streams.
+  /// Reads the next row. Removes trailing empty cells, which exist if other streams have more
+  /// values.
   void ReadRow() {
     row_.clear();
     if (!std::getline(stream_, row_)) return;
@@ -62,9 +63,10 @@ std::string FirstDifference(const fs::path& folder, const fs::path& reference) {
   for (;;) {
     const TimestampRows rows = file.Next(), reference_rows = reference_file.Next();
     if (rows.rows != reference_rows.rows) {
-      const std::string text = "first difference: " + TimestampOf(rows);
+      const std::string text = "the first difference is at " + TimestampOf(rows);
       const bool is_same_time = rows.t_s == reference_rows.t_s;
-      return is_same_time ? text : text + " instead of " + TimestampOf(reference_rows);
+      return is_same_time ? text
+                          : text + ", the other file has " + TimestampOf(reference_rows) + " there";
     }
     if (rows.t_s.empty()) {
       return "the covariances of measurements or the timestamps of empty frames differ";
@@ -127,9 +129,10 @@ std::vector<std::string> CheckSameData(const std::vector<ComparedRun>& runs) {
     if (first.measurements_sha256 != run.measurements_sha256) {
       throw Error(ExitCode::kBadData,
                   ErrorLine(Place{run.folder.string()}, {},
-                            "has other measurements than '" + first.folder.string() + "': " +
-                                run.measurements_sha256 + ", not " + first.measurements_sha256 +
-                                ", " + FirstDifference(run.folder, first.folder),
+                            "the measurements differ from those of '" + first.folder.string() +
+                                "': the SHA-256 is " + run.measurements_sha256 + ", not " +
+                                first.measurements_sha256 + "; " +
+                                FirstDifference(run.folder, first.folder),
                             "runs of the same source, seed and start"));
     }
     if (first.truth_sha256 != run.truth_sha256) {

@@ -60,7 +60,7 @@ bool Diverged(const Comparison& comparison, const std::string& name) {
   return found != comparison.estimators.end() && found->diverged > 0;
 }
 
-/// Appends `name` to the list, unless it is empty or already in the list.
+/// Appends `name` to `names`, unless `name` is empty or already in `names`.
 void AddName(const std::string& name, std::vector<std::string>& names) {
   if (!name.empty() && std::ranges::count(names, name) == 0) names.push_back(name);
 }

@@ -68,7 +68,8 @@ Similarity Align(Alignment alignment, const Trajectory& reference, const Traject
   const Eigen::Matrix3Xd estimate_points = estimate.positions.leftCols(used);
   const Eigen::Matrix3Xd reference_points = reference.positions.leftCols(used);
   if (used < 3) {
-    Fail(estimate.name, std::to_string(used) + " poses are too few for an alignment", "3 or more");
+    Fail(estimate.name, std::to_string(used) + " poses are too few for an alignment",
+         "3 or more poses");
   }
   if (alignment == Alignment::kYaw) return AlignYaw(estimate_points, reference_points);
   if (alignment == Alignment::kSe3) return Umeyama(estimate_points, reference_points, false);
@@ -83,7 +84,7 @@ Similarity Align(Alignment alignment, const Trajectory& reference, const Traject
     Fail(estimate.name,
          "the scale is undetermined: the positions are not correlated with those of " +
              reference.name,
-         "poses of the same trajectory, or --align");
+         "poses of the same trajectory, or --align, which does not estimate the scale");
   }
   Similarity transformation = *similarity;
   if (alignment == Alignment::kScale) {

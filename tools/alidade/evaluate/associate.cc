@@ -51,11 +51,12 @@ Matches MatchByRow(const Trajectory& reference, const Trajectory& estimate) {
   const Trajectory& untimed = reference_is_untimed ? reference : estimate;
   const Trajectory& counterpart = reference_is_untimed ? estimate : reference;
   FailMatching(untimed.name,
-               std::to_string(untimed.size()) + " poses without timestamps, but " +
-                   counterpart.name + " has " + std::to_string(counterpart.size()) + " poses",
+               "the file has " + std::to_string(untimed.size()) +
+                   " poses without timestamps, but " + counterpart.name + " has " +
+                   std::to_string(counterpart.size()) + " poses",
                std::string("a row for each row of the ") +
                    (reference_is_untimed ? "estimate" : "reference") +
-                   ", or timestamps in both (KITTI: NAME_times.txt next to NAME.txt)");
+                   ", or timestamps for both files (KITTI: NAME_times.txt next to NAME.txt)");
 }
 
 std::string Span(const Trajectory& trajectory) {
@@ -76,7 +77,7 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Times
   if (!both_timed) {
     FailMatching((reference.has_timestamps() ? estimate : reference).name,
                  "the poses have no timestamps",
-                 "a times.txt in the same folder, because the other trajectory has timestamps");
+                 "a file times.txt in the same folder, because the other file has timestamps");
   }
   const bool estimate_longer = estimate.size() > reference.size();
   const std::vector<Timestamp>& shorter = (estimate_longer ? reference : estimate).timestamps;
@@ -85,8 +86,8 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Times
   for (const Timestamp end : {shorter.front(), shorter.back()}) {
     if (std::abs(Seconds(end) + Seconds(shift)) < cell::kTimeLimit) continue;
     throw Error(ExitCode::kBadData, ErrorLine({estimate.name}, "--t-offset",
-                                              internal::SecondsText(offset) +
-                                                  " added to the timestamps is beyond 292 years",
+                                              "a timestamp plus " + internal::SecondsText(offset) +
+                                                  " is beyond 292 years",
                                               "the time between the two clocks"));
   }
   Matches matches;
@@ -105,8 +106,9 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Times
   FailMatching(
       estimate.name,
       "no pose is within " + internal::NumberText(Seconds(max_diff)) + " s of a pose of " +
-          reference.name + ": " + Span(estimate) + (offset == 0 ? "" : " and --t-offset") +
-          " compared with " + Span(reference),
+          reference.name + ": the timestamps are from " + Span(estimate) +
+          (offset == 0 ? "" : " plus --t-offset") + ", those of the reference from " +
+          Span(reference),
       "timestamps of the same clock; or --t-offset, which is added to the timestamps of the "
       "estimate; or a larger --t-max-diff");
 }

@@ -57,8 +57,9 @@ ErrorPose RelativeError(const Trajectory& reference, const Trajectory& estimate,
           AngleOf(relative_rotation(reference).conjugate() * relative_rotation(estimate))};
 }
 
-/// Computes the distance of each pose from the first pose: in frames, metres along the trajectory,
-/// rad or ns. Both units of angle use rad. The unit of seconds uses ns, which are exact.
+/// Computes the distance of each pose from the first pose in frames, metres along the trajectory,
+/// rad or ns. For degrees, the distances are in rad. For seconds, the distances are in ns, which
+/// are exact.
 std::vector<double> Progress(const Trajectory& t, DeltaUnit unit) {
   std::vector<double> progress = {0.0};
   for (int i = 1; i < t.size(); ++i) {
@@ -90,7 +91,8 @@ Pairs ConsecutivePairs(const std::vector<double>& progress, double delta, DeltaU
   return pairs;
 }
 
-/// Returns a pair for each pose i: j is the later pose whose distance from i is nearest to delta.
+/// Returns a pair for each pose i. j is the later pose whose distance from i is nearest to delta.
+/// If this distance is outside the tolerance, pose i has no pair.
 Pairs AllPairs(const std::vector<double>& progress, double delta, double tolerance) {
   Pairs pairs;
   for (std::size_t i = 0; i + 1 < progress.size(); ++i) {
@@ -120,7 +122,7 @@ Pairs AllAnglePairs(const Trajectory& t, double delta, double tolerance) {
     if (pairs.size() > kMaxPairs) {
       throw Error(
           ExitCode::kBadData,
-          ErrorLine({t.name}, "--delta", "more than 10000000 pairs of poses are this far apart",
+          ErrorLine({t.name}, "--delta", "more than 10000000 pairs of poses have this rotation",
                     "a larger --delta, or a smaller --delta-tol"));
     }
   }
@@ -171,7 +173,7 @@ Pairs PairsOf(const Trajectory& estimate, const PairOptions& options) {
   };
   if (options.unit == DeltaUnit::kSeconds && !estimate.has_timestamps()) {
     fail("the unit is seconds, but the poses have no timestamps",
-         "--delta-unit f or m, or a times.txt in the same folder");
+         "--delta-unit f or m, or a file times.txt in the same folder");
   }
   const bool degrees = options.unit == DeltaUnit::kDegrees;
   const bool angles = degrees || options.unit == DeltaUnit::kRadians;

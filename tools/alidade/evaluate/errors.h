@@ -8,8 +8,8 @@
 
 namespace alidade::internal {
 
-/// Computes the error of each pose. Both trajectories must have the same number of matched poses,
-/// in the same world.
+/// Computes the error of each pose. Pose i of both trajectories must match, and both must be in the
+/// same world frame.
 PoseErrors AbsoluteErrors(PoseRelation relation, const Trajectory& reference,
                           const Trajectory& estimate);
 /// Computes the error of each pair of poses.

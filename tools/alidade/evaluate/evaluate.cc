@@ -122,7 +122,7 @@ Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
     if (estimate.has_covariances()) {
       evaluation.nees_withheld = std::string("the alignment by ") + ToString(options.alignment) +
                                  " removes part of the error that the covariance describes; "
-                                 "omit the alignment";
+                                 "for the NEES, omit the alignment";
     }
     evaluation.estimate = evaluation.alignment * evaluation.estimate;
   }

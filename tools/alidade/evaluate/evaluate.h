@@ -15,11 +15,12 @@
 
 namespace alidade {
 
-/// Transformation that is applied to the estimate before errors are computed. It fits the positions
-/// of the estimate to those of the reference by least squares [Umeyama1991].
+/// Transformation that is applied to the estimate before errors are computed. Except for kNone and
+/// kOrigin, it fits the positions of the estimate to those of the reference by least squares
+/// [Umeyama1991].
 enum class Alignment {
   kNone,
-  kScale,   ///< only the scale of kSim3, no rotation or translation
+  kScale,   ///< only the scale of kSim3, without rotation and translation
   kOrigin,  ///< rotation and translation that make the first poses equal
   kYaw,     ///< rotation about the world's z axis, and translation [Zhang2018]
   kSe3,     ///< rotation and translation
@@ -28,12 +29,13 @@ enum class Alignment {
 /// Returns `none`, `scale`, `origin`, `yaw`, `se3` or `sim3`.
 const char* ToString(Alignment alignment);
 
-/// Transforms the trajectory to the world of the reference. The result has no covariances.
+/// Transforms the trajectory to the world frame of the reference. The result has no covariances.
 Trajectory operator*(const Similarity& reference_from_estimate, const Trajectory& estimate);
 
-/// Computes the transformation of `estimate` to `reference` from the first `poses` poses of both
-/// (0: all poses). Pose i of both trajectories must match. Error: kBadData if there are fewer than
-/// 3 poses. An alignment with scale also fails if all positions are at one point or uncorrelated.
+/// Computes the transformation of `estimate` to `reference`. Uses the first `poses` poses of both
+/// trajectories, or all poses if `poses` is 0. Pose i of both trajectories must match. Errors:
+/// kBadData if there are fewer than 3 poses; for an alignment with scale, also if all positions are
+/// at one point or uncorrelated.
 Similarity Align(Alignment alignment, const Trajectory& reference, const Trajectory& estimate,
                  int poses = 0);
 
@@ -80,9 +82,10 @@ const char* ToString(DeltaUnit unit);
 struct PairOptions {
   double delta = 1.0;  ///< interval, > 0; a whole number for frames
   DeltaUnit unit = DeltaUnit::kFrames;
-  bool all = false;  ///< true: a pair starts at each pose; false: at the end of the previous pair
-  /// Tolerated deviation from delta, as a fraction of delta. Used for `all` in units other than
-  /// frames.
+  /// True: a pair starts at each pose. False: a pair starts at the end of the previous pair.
+  bool all = false;
+  /// Tolerated deviation from delta, as a fraction of delta. Used only if `all` is true and the
+  /// unit is not frames.
   double tolerance = 0.1;
 };
 /// Returns pairs (i, j), i < j, of poses of the estimate.
@@ -111,21 +114,24 @@ struct PoseErrors {
 /// Statistics of the NEES e' C^-1 e / dof over the poses whose covariance C is regular.
 struct Nees {
   int poses = 0;
-  double mean = 0.0;      ///< mean of the NEES; expected value: 1
-  double within95 = 0.0;  ///< share with e' C^-1 e <= chi2(0.95, dof); expected value: 0.95
-  int dof = 3;            ///< number of axes with uncertainty in at least one pose
+  double mean = 0.0;  ///< mean of the NEES; expected value: 1
+  /// Share of poses with e' C^-1 e <= chi2(0.95, dof). Expected value: 0.95.
+  double within95 = 0.0;
+  int dof = 3;  ///< number of axes with uncertainty in at least one pose
 };
 
 /// Consistency of the accepted measurements of a sensor with the predictions of the filter.
 struct InnovationStatistics {
   std::string sensor;
   std::int64_t measurements = 0;
-  double nis_mean = 0.0;      ///< mean of r' S^-1 r / dof; expected value: 1
-  double nis_within95 = 0.0;  ///< share with r' S^-1 r <= chi2(0.95, dof); expected value: 0.95
+  double nis_mean = 0.0;  ///< mean of r' S^-1 r / dof; expected value: 1
+  /// Share of measurements with r' S^-1 r <= chi2(0.95, dof). Expected value: 0.95.
+  double nis_within95 = 0.0;
   /// Autocorrelation of the normalised elements of r between consecutive measurements of the sensor
   /// (and landmark) [BarShalom2001, sec. 5.4]. Expected value for white innovations: 0.
   double autocorrelation = 0.0;
-  double white_within = 0.0;  ///< 95 % bound of |autocorrelation| if white: 1.96 / sqrt(products)
+  /// 95 % bound of |autocorrelation| for white innovations: 1.96 / sqrt(number of products).
+  double white_within = 0.0;
 };
 /// Reads `NAME/innovations.csv` of a run. Returns the statistics of each sensor, sorted by name.
 /// Errors: kBadData, kInputMissing.
@@ -152,20 +158,21 @@ struct Evaluation {
   std::vector<std::pair<int, int>> pairs;  ///< pairs of the relative errors
   std::vector<PoseErrors> absolute, relative;
   std::optional<double> sim3_scale;  ///< scale of kSim3, if it is determined
-  std::optional<double>
-      scale_drift;  ///< (scale of the second half) / (scale of the first half) - 1
+  /// (Scale of the second half) / (scale of the first half) - 1.
+  std::optional<double> scale_drift;
   std::optional<Nees> position_nees, orientation_nees;
-  std::string nees_withheld;  ///< reason for a missing NEES, if the estimate has covariances
+  std::string nees_withheld;  ///< reason for a missing NEES if the estimate has covariances
   std::vector<InnovationStatistics> innovations;
   std::vector<std::string> warnings;  ///< warnings, each a single line
-  std::string error;  ///< reason why there are no results, or ""; set by the caller of Evaluate
+  /// Reason why there are no results, or "". The caller of Evaluate() sets it.
+  std::string error;
 };
 
 /// Evaluates `estimate`. Warns of conditions under which the results are misleading:
 ///
 ///   - few matches, or an estimate that covers only part of the reference
 ///   - a constant time offset
-///   - a swap of reference and estimate, which is detected by names and covariances
+///   - an exchange of reference and estimate, which is detected by names and covariances
 ///   - a scale that is not metric
 ///   - different world or body frames, or quaternions in the other order
 ///

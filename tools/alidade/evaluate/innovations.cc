@@ -18,8 +18,8 @@ struct SensorSums {
   double nis = 0.0;
   /// Sums of a b, a^2 and b^2 over the elements r / s of consecutive measurements a and b.
   double product = 0.0, before2 = 0.0, after2 = 0.0;
-  std::map<std::string, std::vector<double>>
-      last;  ///< r / s of the last measurement of each landmark
+  /// r / s of the last measurement of each landmark.
+  std::map<std::string, std::vector<double>> last;
 };
 
 /// Indices of the used columns of `NAME/innovations.csv`.
@@ -31,7 +31,8 @@ std::size_t Find(const NumberRows& rows, std::string_view name) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (rows.text(i) == name) return i;
   }
-  rows.FailLine("no column '" + std::string(name) + '\'', "innovations.csv of a run folder");
+  rows.FailLine("the column '" + std::string(name) + "' is missing",
+                "innovations.csv of a run folder");
 }
 
 void AddProducts(const std::string& landmark, const std::vector<double>& r, SensorSums& sums) {
@@ -52,8 +53,8 @@ void AddRow(const NumberRows& rows, const Columns& columns, std::map<std::int64_
   if (dof < 1) rows.FailCell(columns.dof, "dof", "is not a positive number", "1 or more");
   const std::size_t max_dof = rows.size() - std::min(rows.size(), std::max(columns.s0, columns.r0));
   if (static_cast<std::uint64_t>(dof) > max_dof)
-    rows.FailLine("there are too few columns for the value of dof",
-                  "as many columns of s and of r as dof");
+    rows.FailLine("the row has too few columns for the value of dof",
+                  "dof columns for s and dof columns for r");
   ++sums.measurements;
   sums.nis += nis / static_cast<double>(dof);
   const auto [limit, is_new] = limits.try_emplace(dof, 0.0);

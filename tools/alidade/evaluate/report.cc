@@ -24,7 +24,7 @@ using internal::RoundedText;
 
 constexpr int kDecimals = 6;  // number of decimals in evo
 
-/// Statistics with the names and in the order of evo.
+/// Statistics. Names and order are those of evo.
 constexpr std::pair<const char*, double ErrorStatistics::*> kStatistics[] = {
     {"rmse", &ErrorStatistics::rmse},     {"mean", &ErrorStatistics::mean},
     {"median", &ErrorStatistics::median}, {"std", &ErrorStatistics::std},
@@ -66,8 +66,8 @@ std::string TrajectoryText(const Trajectory& trajectory) {
 std::string NeesText(const char* name, const Nees& nees, int poses) {
   return std::string("NEES ") + name + " (" + std::to_string(nees.dof) + " dof) " +
          RoundedText(nees.mean, 4) + " per dof, " + RoundedText(100.0 * nees.within95, 3) +
-         " % within 95 %, " + std::to_string(nees.poses) + " of " + std::to_string(poses) +
-         " poses\n";
+         " % within the 95 % bound, " + std::to_string(nees.poses) + " of " +
+         std::to_string(poses) + " poses\n";
 }
 
 /// Returns a table of all statistics of one evaluation, with a row for each relation.
@@ -107,11 +107,11 @@ std::string ConsistencyText(const Evaluation& evaluation) {
   }
   for (const InnovationStatistics& statistics : evaluation.innovations) {
     text += "NIS " + statistics.sensor + ' ' + RoundedText(statistics.nis_mean, 4) + " per dof, " +
-            RoundedText(100.0 * statistics.nis_within95, 3) + " % within 95 %, " +
+            RoundedText(100.0 * statistics.nis_within95, 3) + " % within the 95 % bound, " +
             std::to_string(statistics.measurements) + " measurements";
     if (std::isfinite(statistics.autocorrelation)) {
       text += "; autocorrelation " + RoundedText(statistics.autocorrelation, 3) +
-              ", white within " + RoundedText(statistics.white_within, 2);
+              ", white if within " + RoundedText(statistics.white_within, 2);
     }
     text += '\n';
   }

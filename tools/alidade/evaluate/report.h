@@ -11,8 +11,8 @@
 /// the entry `failed`.
 namespace alidade {
 
-/// Returns a text for a terminal. For one evaluation it contains all statistics, for several
-/// evaluations a table with a column for each.
+/// Returns a text for a terminal. For one evaluation, the text contains all statistics. For several
+/// evaluations, the text is a table with a column for each evaluation.
 std::string EvaluationText(const std::vector<Evaluation>& evaluations);
 
 /// Returns a Markdown table with a row for each evaluation.

@@ -20,7 +20,8 @@ using Format = TrajectoryFormat;
 
 constexpr const char* kTumColumns = "t x y z qx qy qz qw";
 constexpr const char* kFormats =
-    "8 columns (TUM), 20 (TUM with covariances), 12 (KITTI), or with commas 8 or 17 (EuRoC)";
+    "8 columns (TUM), 20 columns (TUM with covariances), 12 columns (KITTI), or 8 or 17 columns "
+    "separated by commas (EuRoC)";
 constexpr const char* kCovarianceNames[] = {"Pr11", "Pr12", "Pr13", "Pr22", "Pr23", "Pr33",
                                             "Pt11", "Pt12", "Pt13", "Pt22", "Pt23", "Pt33"};
 
@@ -30,7 +31,8 @@ Format Detect(const NumberRows& rows) {
   if (rows.has_commas() && (columns == 8 || columns == 17)) return Format::kEuroc;
   if (!rows.has_commas() && (columns == 8 || columns == 20)) return Format::kTum;
   if (!rows.has_commas() && columns == 12) return Format::kKitti;
-  rows.FailLine(std::to_string(columns) + (columns == 1 ? " column" : " columns"), kFormats);
+  rows.FailLine("the row has " + std::to_string(columns) + (columns == 1 ? " column" : " columns"),
+                kFormats);
 }
 
 /// Unit of time in which TUM timestamps may be written by mistake.
@@ -51,8 +53,8 @@ double Median(std::vector<double> values) {
 
 /// Determines the unit of timestamps from the median t of their values and the median d of their
 /// differences. The unit is the first of s, ms, us and ns that is plausible for a clock that counts
-/// from 1970. If no unit is plausible, it is the first that is plausible for a clock that counts
-/// from any start:
+/// from 1970. If no unit is plausible for such a clock, the unit is the first that is plausible for
+/// a clock that counts from any start:
 ///
 ///   from 1970        1e9 s <= t < 9.2e9 s,  d < 1000 s
 ///   from any start           t < 9.2e9 s,   d < 1000 s for the unit s, otherwise d < 2 s
@@ -86,7 +88,7 @@ class TrajectoryReader {
   Trajectory Read() {
     trajectory_.name = rows_.name();
     while (rows_.Next()) AddRow();
-    if (lines_.empty()) rows_.FailLine("no poses", kFormats);
+    if (lines_.empty()) rows_.FailLine("the file contains no poses", kFormats);
     trajectory_.first_line = lines_.front();
     trajectory_.positions.resize(3, std::ssize(positions_));
     for (std::size_t i = 0; i < positions_.size(); ++i) {
@@ -187,7 +189,8 @@ class TrajectoryReader {
     const double defect =
         (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
     if (!(defect <= kTolerance) || !(rotation.determinant() > 0.0)) {
-      rows_.FailLine("columns 1-3, 5-7, 9-11 are not a rotation", "R R' = 1 to 1e-3, det R = 1");
+      rows_.FailLine("columns 1-3, 5-7, 9-11 are not a rotation matrix",
+                     "R with R R' = 1 to within 1e-3, and det R = 1");
     }
     AddPosition(pose.col(3));
     trajectory_.orientations.push_back(Eigen::Quaterniond(rotation).normalized());
@@ -199,7 +202,8 @@ class TrajectoryReader {
     if (unit.digits != 9) {
       Warn(lines_.front(), "t",
            '\'' + timestamp_texts_.front() +
-               "' and the following timestamps are not plausible as seconds; read as " + unit.name,
+               "' and the following timestamps are not plausible as seconds; they are read as " +
+               unit.name,
            expected);
     }
     for (std::size_t i = 0; i < seconds_.size(); ++i) {
@@ -237,9 +241,9 @@ class TrajectoryReader {
     const bool is_sorted = first_unsorted == order.end();
     if (!is_sorted) {
       Warn(At(lines_, *first_unsorted), "t",
-           "is earlier than the previous timestamp: " +
-               internal::SecondsText(At(timestamps, *first_unsorted)),
-           "poses in the order of their timestamps; they are sorted");
+           internal::SecondsText(At(timestamps, *first_unsorted)) +
+               " is earlier than the previous timestamp",
+           "poses in the order of their timestamps; the poses are sorted");
       std::stable_sort(order.begin(), order.end(), earlier);
     }
     WarnOfDuplicates(order);
@@ -255,9 +259,9 @@ class TrajectoryReader {
         first = order[k];
     }
     if (count == 0) return;
-    std::string text = "duplicate timestamp " + internal::SecondsText(At(timestamps, first));
+    std::string text = internal::SecondsText(At(timestamps, first)) + " is a duplicate timestamp";
     if (count > 1) text += ", the first of " + std::to_string(count) + " duplicate timestamps";
-    Warn(At(lines_, first), "t", text, "each timestamp once; all poses are kept");
+    Warn(At(lines_, first), "t", text, "each timestamp once; all poses are retained");
   }
 
   template <class T>
@@ -277,7 +281,7 @@ class TrajectoryReader {
   std::vector<std::string> timestamp_texts_;  ///< texts of the TUM timestamps
 };
 
-/// Returns the name of the file with the times of one particular KITTI file.
+/// Returns the name of the file that contains the timestamps of only one KITTI file.
 std::filesystem::path DedicatedTimes(const std::filesystem::path& file) {
   return file.stem().string() + "_times.txt";
 }
@@ -307,10 +311,11 @@ void ReadTimes(const std::filesystem::path& times, Trajectory& trajectory) {
   if (std::ssize(trajectory.timestamps) == trajectory.size()) return;
   const std::filesystem::path dedicated = DedicatedTimes(trajectory.name);
   const bool shared = times.filename() != dedicated;
-  rows.FailLine(std::to_string(trajectory.timestamps.size()) + " times for " +
-                    std::to_string(trajectory.size()) + " poses of " + trajectory.name,
+  rows.FailLine("the number of times is " + std::to_string(trajectory.timestamps.size()) +
+                    ", but the number of poses in " + trajectory.name + " is " +
+                    std::to_string(trajectory.size()),
                 "one time for each pose" +
-                    (shared ? ", or " + dedicated.string() + " in the same folder" : ""));
+                    (shared ? ", or a file " + dedicated.string() + " in the same folder" : ""));
 }
 
 }  // namespace

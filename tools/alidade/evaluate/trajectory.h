@@ -23,7 +23,7 @@ enum class TrajectoryFormat { kDetect, kTum, kKitti, kEuroc };
 /// Returns `detect`, `tum`, `kitti` or `euroc`.
 const char* ToString(TrajectoryFormat format);
 
-/// Poses of one body in one world, in the order of their timestamps.
+/// Poses of one body in one world frame, in the order of their timestamps.
 struct Trajectory {
   std::string name;  ///< name of the file
   TrajectoryFormat format = TrajectoryFormat::kTum;
@@ -57,7 +57,7 @@ struct Trajectory {
 ///
 ///   - TUM timestamps are not plausible as seconds; they are read as ns, us or ms
 ///   - poses are out of order; they are sorted
-///   - timestamps are duplicate; all poses are kept
+///   - timestamps are duplicate; all poses are retained
 ///   - the first pose would be the identity in the other quaternion order
 ///
 /// Errors: kInputMissing; kBadData with file, line and column for an invalid row, for a timestamp

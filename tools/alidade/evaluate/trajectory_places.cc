@@ -55,17 +55,18 @@ TrajectoryFile ReferenceAt(const fs::path& path) {
                                path / "mav0" / kEurocReference, path / kEurocReference}) {
     if (IsFile(file)) return labelled(file);
   }
-  FailMissing(path, "no reference in this folder",
+  FailMissing(path, "this folder does not contain a reference trajectory",
               "truth.tum of a run whose source provides true poses, mav0/ of EuRoC, or a file");
 }
 
 TrajectoryFile TruthOf(const fs::path& path) {
   if (!IsFolder(path)) {
     std::error_code error;
-    if (!fs::exists(path, error)) FailMissing(path, "no such folder", "the folder of a run");
+    if (!fs::exists(path, error))
+      FailMissing(path, "the folder does not exist", "the folder of a run");
     throw Error(ExitCode::kUsage,
                 ErrorLine({path.string()}, {}, "a single file cannot be evaluated",
-                          "REF EST, or the folder of a run"));
+                          "two files REF EST, or the folder of a run"));
   }
   std::vector<fs::path> candidates = {path / kTruth};
   if (!EstimatorTrajectory(path).file.empty()) {
@@ -74,8 +75,8 @@ TrajectoryFile TruthOf(const fs::path& path) {
   for (const fs::path& file : candidates) {
     if (IsFile(file)) return {file, file.stem().string(), {}};
   }
-  FailMissing(path, std::string("no ") + kTruth + " in this run",
-              "a run whose source provides true poses; or REF EST");
+  FailMissing(path, std::string("this run does not contain ") + kTruth,
+              "a run whose source provides true poses, or two files REF EST");
 }
 
 std::vector<TrajectoryFile> EstimatesAt(const fs::path& path) {
@@ -92,7 +93,7 @@ std::vector<TrajectoryFile> EstimatesAt(const fs::path& path) {
   std::ranges::sort(found, {}, &TrajectoryFile::label);
   if (!found.empty()) return found;
   FailMissing(
-      path, "no trajectory in this folder",
+      path, "this folder does not contain a trajectory",
       std::string("NAME/") + kTrajectory +
           " of an estimator with blocks X.position and X.orientation (planar: X.heading), or "
           "a file");

@@ -19,14 +19,14 @@ using internal::EigenOf;
 using internal::EigenvaluesOf;
 using internal::RoundedText;
 
-constexpr int kMinPoses = 10;             ///< number of poses that determine frames and scale
+constexpr int kMinPoses = 10;             ///< minimum number of poses to check frames and scale
 constexpr double kMinMatches = 0.5;       ///< minimum share of matched poses
-constexpr double kMaxTimeOffset = 0.5;    ///< median time difference / tolerance
-constexpr double kMaxScaleError = 0.1;    ///< relative deviation of the scale from 1
-constexpr double kMinLength = 0.5;        ///< matched length / length of the reference
-constexpr double kMaxErrorRatio = 10.0;   ///< error without alignment / error with alignment
+constexpr double kMaxTimeOffset = 0.5;    ///< maximum of median time difference / tolerance
+constexpr double kMaxScaleError = 0.1;    ///< maximum relative deviation of the scale from 1
+constexpr double kMinLength = 0.5;        ///< minimum of matched length / reference length
+constexpr double kMaxErrorRatio = 10.0;   ///< maximum of error without / error with alignment
 constexpr double kMinBodyTurnDeg = 10.0;  ///< a larger common turn is not an estimation error
-constexpr double kMaxRemainder = 0.25;    ///< remaining error / error, for an accepted explanation
+constexpr double kMaxRemainder = 0.25;    ///< maximum of error after / before a correction
 constexpr const char* kEurocTruth = "state_groundtruth_estimate0";
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 
@@ -34,8 +34,8 @@ double Rmse(const Trajectory& reference, const Trajectory& estimate) {
   return internal::AbsoluteErrors(PoseRelation::kTranslation, reference, estimate).statistics.rmse;
 }
 
-/// Returns true if a file is named like ground truth: it is in the ground-truth folder of EuRoC, or
-/// its name contains `truth`, or `gt` as a word.
+/// Returns true if a file is named like ground truth. Its folder is the ground-truth folder of
+/// EuRoC, or its name contains `truth`, or its name contains `gt` as a word.
 bool IsNamedLikeTruth(const std::string& file) {
   const std::filesystem::path path = file;
   if (path.parent_path().filename() == kEurocTruth) return true;
@@ -120,19 +120,21 @@ class WarningCollector {
     warnings_.push_back(ErrorLine({whole_estimate_.name}, {}, problem, remedy));
   }
 
-  /// Detects a swap of reference and estimate by names and covariances. The numbers of poses cannot
-  /// reveal a swap, because the truth may have a lower rate than the estimate.
+  /// Detects by names and covariances that reference and estimate are exchanged. The numbers of
+  /// poses cannot reveal this error, because the truth may have a lower rate than the estimate.
   void CheckOrder() {
     const Trajectory &reference = whole_reference_, &estimate = whole_estimate_;
     const char* const remedy = "REF first, then EST";
     if (IsNamedLikeTruth(estimate.name) && !IsNamedLikeTruth(reference.name)) {
-      Warn("is named like ground truth, but is used as the estimate; the reference is " +
+      Warn("the file is named like ground truth, but is used as the estimate; the reference is " +
                reference.name,
            remedy);
     } else if (reference.has_covariances() && !estimate.has_covariances()) {
-      warnings_.push_back(ErrorLine(
-          {reference.name}, {},
-          "has covariances, as an estimate does, but " + estimate.name + " has none", remedy));
+      warnings_.push_back(
+          ErrorLine({reference.name}, {},
+                    "the reference has covariances, as an estimate does, but the estimate " +
+                        estimate.name + " does not have covariances",
+                    remedy));
     }
   }
 
@@ -156,9 +158,9 @@ class WarningCollector {
     std::nth_element(differences.begin(), middle, differences.end());
     const double offset_s = std::abs(Seconds(*middle));
     if (!(offset_s > kMaxTimeOffset * Seconds(evaluation_.options.max_diff))) return;
-    Warn("in the median, the timestamps are " + RoundedText(offset_s) + " s " +
-             (*middle > 0 ? "before" : "after") + " those of the reference",
-         "--t-offset " + RoundedText(Seconds(evaluation_.options.offset + *middle)));
+    Warn("the timestamps are " + RoundedText(offset_s) + " s " +
+             (*middle > 0 ? "before" : "after") + " those of the reference (median difference)",
+         "the option --t-offset " + RoundedText(Seconds(evaluation_.options.offset + *middle)));
   }
 
   void CheckPath() {
@@ -179,10 +181,10 @@ class WarningCollector {
     const double sim3_error = Rmse(evaluation_.reference, sim3 * evaluation_.estimate);
     const double se3_error = Rmse(evaluation_.reference, se3 * evaluation_.estimate);
     if (!(sim3_error < 0.5 * se3_error)) return;
-    Warn("scale " + RoundedText(sim3.scale, 4) + " (error " + RoundedText(sim3_error, 4) +
-             " m with sim3, " + RoundedText(se3_error, 4) +
-             " m with se3): probably a run without metric scale",
-         "-as");
+    Warn("the scale is " + RoundedText(sim3.scale, 4) + " (the error is " +
+             RoundedText(sim3_error, 4) + " m with sim3 and " + RoundedText(se3_error, 4) +
+             " m with se3): the estimate probably has no metric scale",
+         "the option -as, which aligns with scale");
   }
 
   void CheckWorld() {
@@ -192,16 +194,16 @@ class WarningCollector {
     const double original = Rmse(evaluation_.reference, evaluation_.estimate);
     if (!(original > kMaxErrorRatio * aligned_error)) return;
     Warn("the error is " + RoundedText(original, 4) + " m without alignment and " +
-             RoundedText(aligned_error, 4) + " m with se3: probably another world frame",
-         "--align");
+             RoundedText(aligned_error, 4) + " m with se3: the world frames probably differ",
+         "the option --align");
   }
 
   void CheckLine() {
     const Alignment alignment = evaluation_.options.alignment;
     if (alignment != Alignment::kSe3 && alignment != Alignment::kSim3) return;
-    Warn(std::string("positions of the estimate or the reference are collinear: the rotation of ") +
-             ToString(alignment) +
-             " about the line is arbitrary, so orientation errors are arbitrary as well",
+    Warn("the positions of the estimate or the reference are collinear: the rotation of " +
+             std::string(ToString(alignment)) +
+             " about the line and the orientation errors are arbitrary",
          "no alignment, --align-origin or --align-mode yaw for orientation errors");
   }
 
@@ -220,22 +222,23 @@ class WarningCollector {
         reordered_spread_deg < kMaxRemainder * original.spread_deg) {
       const Trajectory& wrong = estimate_is_wrong ? whole_estimate_ : whole_reference_;
       const bool w_first = wrong.format == TrajectoryFormat::kEuroc;
-      warnings_.push_back(
-          ErrorLine({wrong.name, wrong.first_line, 0}, {},
-                    "the orientations agree to " + internal::FixedText(reordered_spread_deg, 1) +
-                        " deg if quaternions are read with w " +
-                        (w_first ? "last, and to " : "first, and to ") +
-                        internal::FixedText(original.spread_deg, 1) + " deg as read",
-                    w_first ? "qw qx qy qz" : "qx qy qz qw"));
+      warnings_.push_back(ErrorLine({wrong.name, wrong.first_line, 0}, {},
+                                    "the orientations agree to " +
+                                        internal::FixedText(reordered_spread_deg, 1) +
+                                        " deg if quaternions are read with w " +
+                                        (w_first ? "last, but only to " : "first, but only to ") +
+                                        internal::FixedText(original.spread_deg, 1) +
+                                        " deg with w " + (w_first ? "first" : "last"),
+                                    w_first ? "qw qx qy qz" : "qx qy qz qw"));
     } else if (original.turn_deg > kMinBodyTurnDeg &&
                original.spread_deg < kMaxRemainder * original.turn_deg) {
       Warn("all orientations differ by the same rotation of " + RoundedText(original.turn_deg, 4) +
-               " deg: probably another body frame",
-           "poses of the same body frame; the positions may also be those of another point");
+               " deg: the body frames probably differ",
+           "poses of the same body frame; the positions may also belong to different points");
     }
   }
 
-  const Evaluation& evaluation_;  ///< the estimate in it is not aligned yet
+  const Evaluation& evaluation_;  ///< evaluation, in which the estimate is not aligned yet
   const Matches& matches_;
   const Trajectory& whole_reference_;
   const Trajectory& whole_estimate_;

@@ -15,18 +15,18 @@
 #include "alidade/record/recorded_run.h"
 #include "alidade/state/element_names.h"
 
-/// Columns of the csv files of a run folder. There is one table for each file. To add a column, add
-/// an entry to the table.
+/// Columns of the csv files of a run folder. There is one table for each file. To add a column to a
+/// file, add an entry to the table of that file.
 namespace alidade::internal {
 
-/// Returns columns whose names are a letter and a number: `v0`, `v1` and so on.
+/// Returns `count` columns. The name of a column is `letter` followed by the index: `v0`, `v1`, ...
 inline std::vector<Column> NumberedColumns(const std::string& letter, std::size_t count) {
   std::vector<Column> columns;
   for (std::size_t i = 0; i < count; ++i) columns.push_back({letter + std::to_string(i), "", ""});
   return columns;
 }
 
-/// Writes a number, or an empty cell if it is not finite.
+/// Writes a number, or an empty cell if the number is not finite.
 inline void WriteFinite(double value, CsvFile& file) {
   std::isfinite(value) ? file.Number(value) : file.Empty();
 }
@@ -34,7 +34,7 @@ inline void WriteFinite(double value, CsvFile& file) {
 // Columns of measurements.csv.
 
 struct MeasurementLayout {
-  std::size_t width, known_width;  ///< numbers of columns that the widest stream needs
+  std::size_t width, known_width;  ///< numbers of columns `v` and `known` for the widest stream
 };
 struct MeasurementRow {
   const Measurement& measurement;
@@ -52,14 +52,15 @@ inline constexpr std::array kMeasurementColumns =
          [](const auto&, const MeasurementRow& row, CsvFile& file) {
            file.Landmark(row.measurement.landmark);
          }},
-        {"v", "of the stream",
+        {"v", "unit of the stream",
          "values of the measurement; the widest stream determines the number of columns",
          [](const MeasurementLayout& layout, const MeasurementRow& row, CsvFile& file) {
            file.Numbers(row.measurement.values.data(), row.measurement.values.size(), layout.width);
          },
          [](const MeasurementLayout& layout) { return NumberedColumns("v", layout.width); },
          "`v0`, `v1`, ..."},
-        {"known", "of the stream", "the known numbers of the measurement, if a stream has any",
+        {"known", "unit of the stream",
+         "known numbers of the measurement; the columns exist if a stream has known numbers",
          [](const MeasurementLayout& layout, const MeasurementRow& row, CsvFile& file) {
            file.Numbers(row.measurement.known.data(), row.measurement.known.size(),
                         layout.known_width);
@@ -79,7 +80,8 @@ struct TruthLayout {
 inline constexpr std::array kTruthColumns = std::to_array<ColumnInfo<TruthLayout, SourceFrame>>({
     {"t_s", "s", "timestamp of the frame",
      [](const auto&, const SourceFrame& frame, CsvFile& file) { file.Time(frame.timestamp); }},
-    {"truth", "of the block", "each element of each truth; the source provides the names",
+    {"truth", "unit of the block",
+     "each element of each true value; the source names the true values",
      [](const TruthLayout& layout, const SourceFrame& frame, CsvFile& file) {
        for (std::size_t t = 0; t < layout.truths.size(); ++t) {
          const auto size = static_cast<std::size_t>(layout.truths[t].size);
@@ -115,7 +117,7 @@ inline constexpr std::array kExpectedColumns =
          [](const auto&, const ExpectedRow& row, CsvFile& file) { file.Time(row.timestamp); }},
         {"stream", "", "stream of the source",
          [](const auto&, const ExpectedRow& row, CsvFile& file) { file.Text(row.stream); }},
-        {"v", "of the stream", "prediction h at the true state",
+        {"v", "unit of the stream", "predicted measurement h at the true state",
          [](const ExpectedLayout& layout, const ExpectedRow& row, CsvFile& file) {
            file.Numbers(row.values.data(), row.values.size(), layout.width);
          },
@@ -139,7 +141,7 @@ inline constexpr std::array kImpliedColumns = std::to_array<ColumnInfo<ImpliedLa
      [](const auto&, const ImpliedRow& row, CsvFile& file) { file.Time(row.timestamp); }},
     {"sensor", "", "sensor of the measurement",
      [](const auto&, const ImpliedRow& row, CsvFile& file) { file.Text(row.sensor); }},
-    {"value", "of the block", "value of the block that the measurement implies",
+    {"value", "unit of the block", "value of the block that the measurement implies",
      [](const ImpliedLayout& layout, const ImpliedRow& row, CsvFile& file) {
        file.Empty(row.block).Number(row.value).Empty(layout.blocks.size() - row.block - 1);
      },
@@ -155,7 +157,7 @@ struct BlockLayout {
   BlockId id;
   Space space;
   std::string name, unit;
-  int truth;  ///< index into SourceFrame::truth; -1: none
+  int truth;  ///< index into SourceFrame::truth; -1: the block has no truth
 
   std::size_t ambient() const { return static_cast<std::size_t>(space.geometry.ambient); }
   std::size_t tangent() const { return static_cast<std::size_t>(space.geometry.tangent); }
@@ -186,7 +188,8 @@ struct BlockRow {
     for (double& element : error) element = 0.0 - element;
     return error;
   }
-  /// Returns sqrt(P_ii). The result is empty if the block has no covariance.
+  /// Returns sqrt(P_ii) of each tangent element. The result is empty if the block has no
+  /// covariance.
   std::vector<double> SigmasOf(const BlockLayout& block) const {
     const Block& state_block = state.layout()[block.id];
     std::vector<double> sigmas;
@@ -205,16 +208,16 @@ std::vector<BlockLayout> BlockLayoutsOf(const Problem& problem,
 struct BlockColumnInfo {
   const char* quantity;
   const char* names;                         ///< names of the columns, for the documentation
-  const char* unit;                          ///< for the documentation
-  const char* meaning;                       ///< meaning for the documentation, in Markdown
+  const char* unit;                          ///< unit, for the documentation
+  const char* meaning;                       ///< meaning, for the documentation, in Markdown
   std::size_t (BlockLayout::*size)() const;  ///< number of columns
   std::vector<Column> (*columns)(const BlockLayout& block);
   std::vector<double> (*numbers)(const BlockLayout& block,
-                                 const BlockRow& row);  ///< an empty result leaves the cells empty
+                                 const BlockRow& row);  ///< values of the cells; empty: no values
 };
 
-/// Returns a column for each tangent element of a block. The name of a column is `prefix` and the
-/// element.
+/// Returns a column for each tangent element of a block. The name of a column is `prefix` followed
+/// by the name of the element.
 inline std::vector<Column> TangentColumns(const BlockLayout& block, const std::string& prefix) {
   std::vector<Column> columns;
   for (const std::string& name : TangentNames(block.name, block.space)) {
@@ -227,16 +230,17 @@ inline std::vector<Column> TangentColumns(const BlockLayout& block, const std::s
 inline constexpr BlockColumnInfo kSigmaColumns{
     "sigma",
     "`sigma:block.element`",
-    "of the block; rad for an angle or rotation",
-    "sqrt(P_ii) of each tangent element; empty without a covariance",
+    "unit of the block; rad for an angle or rotation",
+    "sqrt(P_ii) of each tangent element; empty if the block has no covariance",
     &BlockLayout::tangent,
     [](const BlockLayout& block) { return TangentColumns(block, "sigma:"); },
     [](const BlockLayout& block, const BlockRow& row) { return row.SigmasOf(block); }};
 
 inline constexpr std::array kEstimateColumns{
     BlockColumnInfo{
-        "value", "`block.element`", "of the block",
-        "each ambient element; empty until the block is initialised", &BlockLayout::ambient,
+        "value", "`block.element`", "unit of the block",
+        "value of each ambient element; empty until the block is initialised",
+        &BlockLayout::ambient,
         [](const BlockLayout& block) {
           std::vector<Column> columns;
           for (const std::string& name : AmbientNames(block.name, block.space)) {
@@ -249,8 +253,8 @@ inline constexpr std::array kEstimateColumns{
 
 inline constexpr std::array kErrorColumns{
     BlockColumnInfo{
-        "error", "`block.element`", "of the block; rad for an angle or rotation",
-        "e = x (-) x_true of each tangent element, at the estimate; empty without truth",
+        "error", "`block.element`", "unit of the block; rad for an angle or rotation",
+        "e = x (-) x_true of each tangent element; empty if the truth is unknown",
         &BlockLayout::tangent, [](const BlockLayout& block) { return TangentColumns(block, ""); },
         [](const BlockLayout& block, const BlockRow& row) { return row.ErrorOf(block); }},
     kSigmaColumns};
@@ -289,59 +293,63 @@ struct InnovationRow {
 
   bool is_predicted() const { return !report.s.empty(); }
 };
-inline constexpr std::array kInnovationColumns = std::to_array<
-    ColumnInfo<InnovationLayout, InnovationRow>>({
-    {"t_s", "s", "timestamp of the frame",
-     [](const auto&, const InnovationRow& row, CsvFile& file) { file.Time(row.timestamp); }},
-    {"stream", "", "stream of the source",
-     [](const auto&, const InnovationRow& row, CsvFile& file) { file.Text(row.sensor.stream); }},
-    {"sensor", "", "sensor of the estimator",
-     [](const auto&, const InnovationRow& row, CsvFile& file) { file.Text(row.sensor.name); }},
-    {"landmark", "", "id of the landmark; empty if the measurement has no id",
-     [](const auto&, const InnovationRow& row, CsvFile& file) {
-       file.Landmark(row.report.landmark);
-     }},
-    {"outcome", "", "outcome of the measurement, see [Outcomes](run_folder.md#outcomes)",
-     [](const auto&, const InnovationRow& row, CsvFile& file) {
-       file.Text(ToString(row.report.outcome));
-     }},
-    {"dof", "", "degrees of freedom",
-     [](const auto&, const InnovationRow& row, CsvFile& file) { file.Integer(row.report.dof); }},
-    {"nis", "", "r' S^-1 r, not divided by `dof`; empty if S was not computed",
-     [](const auto&, const InnovationRow& row, CsvFile& file) {
-       row.is_predicted() ? file.Number(row.report.nis) : file.Empty();
-     }},
-    {"z", "of the sensor", "the measurement, each ambient element",
-     [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
-       file.Numbers(row.report.z.data(), row.report.z.size(), layout.width);
-     },
-     [](const InnovationLayout& layout) { return NumberedColumns("z", layout.width); },
-     "`z0`, `z1`, ..."},
-    {"h", "of the sensor", "the prediction h(x), each ambient element",
-     [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
-       file.Numbers(row.report.h.data(), row.report.h.size(), layout.width);
-     },
-     [](const InnovationLayout& layout) { return NumberedColumns("h", layout.width); },
-     "`h0`, `h1`, ..."},
-    {"s", "of the sensor",
-     "sqrt(S_ii) of each tangent element, S = H P H' + R; with a robust loss S = H P H' + R / w",
-     [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
-       std::vector<double> sigmas;
-       const auto m = static_cast<std::size_t>(row.report.dof);
-       for (std::size_t i = 0; i < m && row.is_predicted(); ++i) {
-         sigmas.push_back(std::sqrt(row.report.s[i * m + i]));
-       }
-       file.Numbers(sigmas.data(), sigmas.size(), layout.width);
-     },
-     [](const InnovationLayout& layout) { return NumberedColumns("s", layout.width); },
-     "`s0`, `s1`, ..."},
-    {"r", "of the sensor", "the innovation z (-) h, each tangent element",
-     [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
-       file.Numbers(row.report.innovation.data(), row.report.innovation.size(), layout.width);
-     },
-     [](const InnovationLayout& layout) { return NumberedColumns("r", layout.width); },
-     "`r0`, `r1`, ..."},
-});
+inline constexpr std::array kInnovationColumns =
+    std::to_array<ColumnInfo<InnovationLayout, InnovationRow>>({
+        {"t_s", "s", "timestamp of the frame",
+         [](const auto&, const InnovationRow& row, CsvFile& file) { file.Time(row.timestamp); }},
+        {"stream", "", "stream of the source",
+         [](const auto&, const InnovationRow& row, CsvFile& file) {
+           file.Text(row.sensor.stream);
+         }},
+        {"sensor", "", "sensor of the estimator",
+         [](const auto&, const InnovationRow& row, CsvFile& file) { file.Text(row.sensor.name); }},
+        {"landmark", "", "id of the landmark; empty if the measurement has no id",
+         [](const auto&, const InnovationRow& row, CsvFile& file) {
+           file.Landmark(row.report.landmark);
+         }},
+        {"outcome", "", "outcome of the measurement, see [Outcomes](run_folder.md#outcomes)",
+         [](const auto&, const InnovationRow& row, CsvFile& file) {
+           file.Text(ToString(row.report.outcome));
+         }},
+        {"dof", "", "degrees of freedom of the measurement",
+         [](const auto&, const InnovationRow& row, CsvFile& file) {
+           file.Integer(row.report.dof);
+         }},
+        {"nis", "", "r' S^-1 r, not divided by `dof`; empty if S was not computed",
+         [](const auto&, const InnovationRow& row, CsvFile& file) {
+           row.is_predicted() ? file.Number(row.report.nis) : file.Empty();
+         }},
+        {"z", "unit of the sensor", "each ambient element of the measurement z",
+         [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
+           file.Numbers(row.report.z.data(), row.report.z.size(), layout.width);
+         },
+         [](const InnovationLayout& layout) { return NumberedColumns("z", layout.width); },
+         "`z0`, `z1`, ..."},
+        {"h", "unit of the sensor", "each ambient element of the prediction h(x)",
+         [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
+           file.Numbers(row.report.h.data(), row.report.h.size(), layout.width);
+         },
+         [](const InnovationLayout& layout) { return NumberedColumns("h", layout.width); },
+         "`h0`, `h1`, ..."},
+        {"s", "unit of the sensor",
+         "sqrt(S_ii) of each tangent element; S = H P H' + R, or H P H' + R / w with a robust loss",
+         [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
+           std::vector<double> sigmas;
+           const auto m = static_cast<std::size_t>(row.report.dof);
+           for (std::size_t i = 0; i < m && row.is_predicted(); ++i) {
+             sigmas.push_back(std::sqrt(row.report.s[i * m + i]));
+           }
+           file.Numbers(sigmas.data(), sigmas.size(), layout.width);
+         },
+         [](const InnovationLayout& layout) { return NumberedColumns("s", layout.width); },
+         "`s0`, `s1`, ..."},
+        {"r", "unit of the sensor", "each tangent element of the innovation z (-) h",
+         [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
+           file.Numbers(row.report.innovation.data(), row.report.innovation.size(), layout.width);
+         },
+         [](const InnovationLayout& layout) { return NumberedColumns("r", layout.width); },
+         "`r0`, `r1`, ..."},
+    });
 
 // Columns of NAME/gains.csv.
 
@@ -352,15 +360,15 @@ struct GainRow {
   Timestamp timestamp;
   const std::string& sensor;
   const std::vector<const double*>&
-      cells;  ///< one for each element; null: element of another sensor
+      cells;  ///< elements of K; null if the column belongs to another sensor
 };
 inline constexpr std::array kGainColumns = std::to_array<ColumnInfo<GainLayout, GainRow>>({
     {"t_s", "s", "timestamp of the frame",
      [](const auto&, const GainRow& row, CsvFile& file) { file.Time(row.timestamp); }},
     {"sensor", "", "sensor of the estimator",
      [](const auto&, const GainRow& row, CsvFile& file) { file.Text(row.sensor); }},
-    {"gain", "of the block / of the sensor",
-     "element of K for the block element and the measured element; empty for other sensors",
+    {"gain", "unit of the block / unit of the sensor",
+     "element of the gain K from a measured element to a block element; empty for other sensors",
      [](const auto&, const GainRow& row, CsvFile& file) {
        for (const double* const cell : row.cells) {
          cell != nullptr ? file.Number(*cell) : file.Empty();
@@ -389,7 +397,7 @@ inline constexpr std::array kReprojectionColumns =
            file.Integer(row.innovation.measurements);
          }},
         {"rms", "",
-         "sqrt(mean r_i^2) over all elements of the accepted innovations, unit of the sensor",
+         "sqrt(mean r_i^2) over the elements of all accepted innovations, unit of the sensor",
          [](const auto&, const ReprojectionRow& row, CsvFile& file) {
            file.Number(row.innovation.rms);
          }},
@@ -406,9 +414,9 @@ inline constexpr std::array kEventColumns = std::to_array<ColumnInfo<NoLayout, E
 
 inline constexpr std::array kLandmarkColumns =
     std::to_array<ColumnInfo<NoLayout, LandmarkEstimate>>({
-        {"id", "", "id of the measurements",
+        {"id", "", "id of the landmark",
          [](const auto&, const auto& landmark, CsvFile& file) { file.Integer(landmark.id); }},
-        {"generation", "", "number of earlier landmarks with this id, which were deleted",
+        {"generation", "", "number of earlier landmarks that had this id and were removed",
          [](const auto&, const auto& landmark, CsvFile& file) {
            file.Integer(landmark.generation);
          }},
@@ -434,7 +442,7 @@ inline constexpr std::array kLandmarkColumns =
          [](const auto&, const auto& l,
             CsvFile& file) { WriteFinite(std::sqrt(l.covariance(2, 2)), file); }},
         {"inverse_distance", "1/m",
-         "inverse distance from the camera position of the first observation; empty for xyz",
+         "inverse distance from the camera position at the first observation; empty for xyz",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.inverse_distance, file); }},
         {"sigma_inverse_distance", "1/m", "standard deviation of the inverse distance",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.sigma, file); }},
@@ -442,7 +450,7 @@ inline constexpr std::array kLandmarkColumns =
          [](const auto&, const auto& landmark, CsvFile& file) { file.Time(landmark.first); }},
         {"last_s", "s", "timestamp of the last observation",
          [](const auto&, const auto& landmark, CsvFile& file) { file.Time(landmark.last); }},
-        {"tried", "", "number of measurements",
+        {"tried", "", "number of measurements of the landmark",
          [](const auto&, const auto& landmark, CsvFile& file) { file.Integer(landmark.tried); }},
         {"accepted", "", "number of accepted measurements",
          [](const auto&, const auto& landmark, CsvFile& file) { file.Integer(landmark.accepted); }},
@@ -458,7 +466,8 @@ inline constexpr std::array kLandmarkColumns =
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.covariance(0, 2), file); }},
         {"cov_yz", "m^2", "",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.covariance(1, 2), file); }},
-        {"status", "", "`kept`: in the final state; `removed`: removed during the run",
+        {"status", "",
+         "`kept` if the landmark is in the final state; `removed` if it was removed during the run",
          [](const auto&, const auto& landmark, CsvFile& file) {
            file.Text(landmark.removed == kNoTimestamp ? "kept" : "removed");
          }},
@@ -471,12 +480,12 @@ struct TimingLayout {
 };
 struct TimingRow {
   Timestamp timestamp;
-  const std::vector<std::optional<double>>& wall_s;  ///< one for each estimator
+  const std::vector<std::optional<double>>& wall_s;  ///< time of each estimator; empty if unknown
 };
 inline constexpr std::array kTimingColumns = std::to_array<ColumnInfo<TimingLayout, TimingRow>>({
     {"t_s", "s", "timestamp of the frame",
      [](const auto&, const TimingRow& row, CsvFile& file) { file.Time(row.timestamp); }},
-    {"wall", "s", "wall-clock time of each online estimator",
+    {"wall", "s", "wall-clock time of each online estimator for the frame",
      [](const auto&, const TimingRow& row, CsvFile& file) {
        for (const std::optional<double>& cell : row.wall_s) {
          cell ? file.Number(*cell) : file.Empty();

@@ -20,12 +20,12 @@ struct Column {
 };
 
 /// Entry in the column table of a file: a single column, or several columns of one quantity. A
-/// `Layout` determines the columns, a `Row` the cells.
+/// `Layout` determines the columns. A `Row` determines the cells.
 template <class Layout, class Row>
 struct ColumnInfo {
-  const char* quantity;  ///< quantity, and name of a single column
-  const char* unit;      ///< unit of a single column; otherwise only for the documentation
-  const char* meaning;   ///< meaning for the documentation, in Markdown
+  const char* quantity;  ///< quantity; also the name of a single column
+  const char* unit;      ///< unit of a single column; for several columns, only documentation
+  const char* meaning;   ///< meaning, for the documentation, in Markdown
   void (*write)(const Layout& layout, const Row& row, CsvFile& file);
   std::vector<Column> (*columns)(const Layout& layout) = nullptr;  ///< null: a single column
   const char* names = "";  ///< names of several columns, for the documentation
@@ -54,7 +54,8 @@ void WriteCells(const std::array<ColumnInfo<Layout, Row>, kCount>& table, const 
   for (const ColumnInfo<Layout, Row>& info : table) info.write(layout, row, file);
 }
 
-/// Columns of all csv files of a run folder, by file name. `columns.json` contains them.
+/// Columns of each csv file of a run folder. The key is the name of the file. `columns.json`
+/// contains this map.
 using RunColumns = std::map<std::string, std::vector<Column>>;
 
 /// Creates a csv file with `columns`, and adds these columns to `run_columns`. Errors:

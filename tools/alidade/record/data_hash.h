@@ -9,15 +9,16 @@
 
 namespace alidade::internal {
 
-/// SHA-256 of the data of a source. The hash depends only on the values. It does not depend on the
-/// text in a data file or on the simulator.
+/// SHA-256 of the data of a source. The hash does not depend on the text of a data file or on the
+/// simulator, but only on these data:
 ///
-///   measurements   timestamp of each frame; stream, landmark, values and covariance of each
-///                  measurement in the frame, sorted by the name of the stream
-///   truth          timestamp, name and values of each known truth of a frame
+///   measurements   timestamp of each frame; timestamp, stream, landmark, values, covariance and
+///                  known numbers of each measurement. The measurements of a frame are sorted by
+///                  the name of the stream.
+///   truth          timestamp, name and values of each known true value of a frame
 ///
-/// A number contributes 8 bytes, the lowest byte first. 0 and -0 have the same bytes, and so do all
-/// NaNs.
+/// A number contributes 8 bytes, the lowest byte first. 0 and -0 contribute the same bytes. All
+/// NaNs contribute the same bytes.
 class DataHash {
  public:
   DataHash(std::vector<StreamInfo> streams, std::vector<StreamInfo> truths);
@@ -32,7 +33,7 @@ class DataHash {
   std::vector<StreamInfo> streams_, truths_;
   Sha256Stream measurements_, truth_;
   bool has_truth_ = false;
-  std::string bytes_;  ///< bytes of one frame; a member, so the memory is reused
+  std::string bytes_;  ///< bytes of one frame; a member, so that its memory is reused
 };
 
 }  // namespace alidade::internal

@@ -2,7 +2,7 @@
 #pragma once
 
 /// Texts of files in this folder, without the licence lines. The CMake function alidade_embed
-/// generates the source.
+/// generates the source file that defines these texts.
 namespace alidade::internal {
 
 extern const char* const kReportCss;    ///< text of report.css

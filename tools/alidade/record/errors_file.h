@@ -10,16 +10,17 @@
 
 namespace alidade::internal {
 
-/// Writer of `NAME/errors.csv`. The file exists if the source provides the truth of a block:
+/// Writer of `NAME/errors.csv`. The file exists if the source provides the truth of a block. It
+/// contains these numbers for each tangent element:
 ///
-///   e      = x (-) x_true    of each tangent element, in the tangent space at the estimate
-///   sigma  = sqrt(P_ii)      of the estimate; the uncertainty of the truth is not included
+///   e      = x (-) x_true    error, in the tangent space at the estimate
+///   sigma  = sqrt(P_ii)      standard deviation of the estimate, without that of the truth
 ///
 /// e is computed as -(x_true (-) x), which equals x (-) x_true for vectors, angles and rotations.
-/// The error of a rotation is in the body frame, rad.
+/// The error of a rotation is expressed in the body frame, in rad.
 class ErrorsFile {
  public:
-  /// `blocks` are all blocks of the problem. If no block has a truth, the file is not created.
+  /// `blocks` contains all blocks of the problem. If no block has a truth, the file is not created.
   ErrorsFile(const OutputFolder& folder, const std::string& estimator,
              const std::vector<BlockLayout>& blocks, RunColumns& run_columns);
 
@@ -33,7 +34,7 @@ class ErrorsFile {
  private:
   void Record(const BlockRow& row);
 
-  std::vector<BlockLayout> blocks_;  ///< only the blocks with truth
+  std::vector<BlockLayout> blocks_;  ///< blocks that have a truth
   std::vector<RecordedError> elements_;
   std::optional<CsvFile> file_;  ///< empty if no block has a truth
 };

@@ -23,21 +23,21 @@ struct SeriesBlock {
 /// Returns the blocks of the initial state of a problem.
 std::vector<SeriesBlock> SeriesBlocksOf(const Problem& problem);
 
-/// Appends the lower triangle of P to `cells`, row by row, for the first `blocks` blocks. Elements
-/// of blocks without covariance are NaN.
+/// Appends the covariance of the first `blocks` blocks to `cells`: its lower triangle, row by row.
+/// Elements of blocks without covariance are NaN.
 void AppendCovariance(const State& state, std::size_t blocks, std::vector<double>& cells);
 
 /// Estimates of one estimator at each timestamp. N is the sum of the ambient sizes of all blocks.
 struct Series {
-  /// Largest number of tangent elements with a joint covariance. A larger series contains only
-  /// variances, to limit the memory.
+  /// Maximum number of tangent elements for which a series contains the joint covariance. A larger
+  /// series contains only variances, which limits its memory.
   static constexpr int kMaxJoint = 64;
 
   std::vector<SeriesBlock> blocks;
   std::vector<Timestamp> timestamps;
   std::vector<double> values;  ///< N numbers for each timestamp; NaN if a block has no value
-  /// Covariances at each timestamp: if `joint`, the lower triangle of P row by row, otherwise the
-  /// diagonal of P. Elements of blocks without covariance are NaN.
+  /// Covariances at each timestamp. If `joint` is true, these are the lower triangle of P, row by
+  /// row. Otherwise they are the diagonal of P. Elements of blocks without covariance are NaN.
   std::vector<double> covariances;
   bool joint = true;
 
@@ -45,8 +45,8 @@ struct Series {
   int tangent() const;
   /// Returns the number of elements of `covariances` for each timestamp.
   std::size_t cells() const;
-  /// Returns P of `size` tangent elements, starting at element `first`, at timestamp index `row`. P
-  /// is diagonal unless `joint`.
+  /// Returns the covariance of the `size` tangent elements from element `first` on, at the
+  /// timestamp with index `row`. The result is diagonal unless `joint` is true.
   Eigen::MatrixXd Covariance(std::size_t row, int first, int size) const;
   void Append(Timestamp timestamp, const State& state);
 };

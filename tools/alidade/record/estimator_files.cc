@@ -19,8 +19,9 @@ std::string InParentheses(const std::string& unit) {
   return unit.find_first_of("/ ^") == unit.npos ? unit : '(' + unit + ')';
 }
 
-/// Returns the unit of the gain of a block element whose unit is `unit`. Returns "" if the gain has
-/// no unit or an unknown unit. The unit is unknown if the measured elements have no common unit.
+/// Returns the unit of the gain from a measurement of `sensor` to a block element with the unit
+/// `unit`. Returns "" if the gain has no unit or an unknown unit. The unit is unknown if the
+/// measured elements have no common unit.
 std::string UnitOfGain(const std::string& unit, const RecordedSensor& sensor) {
   if (unit == sensor.unit) return "";
   if (sensor.unit.empty()) return sensor.tangent == 1 ? unit : "";
@@ -123,7 +124,7 @@ void EstimatorFiles::AddBlocks(const Problem& problem, const TruthLayout& truth)
 GainLayout EstimatorFiles::AddGains(const Problem& problem) {
   GainLayout layout;
   std::map<std::string, std::size_t>
-      cells;  // column of each name; sensors with equal element names share columns
+      cells;  // name of a gain -> column; gains with the same name share a column
   for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
     const Space& space = problem.sensors[s].model->measurement();
     if (problem.sensors[s].model->has_landmark()) continue;
@@ -166,7 +167,7 @@ void EstimatorFiles::Add(const SourceFrame& frame, const State& state, const Upd
   }
 }
 
-/// Records which elements have a value, a truth or a variance.
+/// Records which elements have a value, a true value or a positive variance.
 void EstimatorFiles::RecordEstimate(const SourceFrame& frame, const State& state) {
   const BlockRow row{frame, state};
   for (const RecordedBlock& recorded : blocks_) {
@@ -239,7 +240,7 @@ void EstimatorFiles::AddGain(Timestamp timestamp, const State& state,
   RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
   std::vector<const double*> cells(gain_layout_.elements.size(), nullptr);
   const std::size_t rows = report.gain.size() / static_cast<std::size_t>(sensor.tangent);
-  std::size_t next = 0;  // index into sensor.gains, ordered by block, element and measured element
+  std::size_t next = 0;  // index into sensor.gains; order: block, element, measured element
   std::size_t row = 0;   // row of K
   for (const RecordedBlock& recorded : blocks_) {
     const Block& block = state.layout()[recorded.layout.id];

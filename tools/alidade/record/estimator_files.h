@@ -13,23 +13,24 @@
 
 namespace alidade::internal {
 
-/// Writer of those files of one estimator that grow with each frame. They contain the blocks and
-/// the sensors of the initial problem:
+/// Writer of the files of one estimator to which each frame adds data. The files contain the blocks
+/// and the sensors of the initial problem:
 ///
 ///   estimates.csv, innovations.csv, gains.csv
-///   errors.csv                   if a block has truth
+///   errors.csv                   if a block has a truth
 ///   reprojection.csv             if a sensor observes landmarks
 ///   trajectory.tum               if there are blocks X.position and X.orientation
 ///   trajectory_covariance.tum    if these blocks also have a covariance
-///   covariance.bin               on request
+///   covariance.bin               if requested
 class EstimatorFiles {
  public:
-  /// `truth` contains the columns of truth.csv. If `covariances`, covariance.bin is also written.
+  /// `truth` contains the columns of truth.csv. If `covariances` is true, covariance.bin is also
+  /// written.
   EstimatorFiles(const OutputFolder& folder, const EstimatorSpec& spec, const TruthLayout& truth,
                  bool covariances, RunColumns& run_columns);
 
-  /// Writes the rows of a frame. If the frame is older than the state, no row is written to
-  /// estimates.csv, because the state has a later timestamp. Error: kIo.
+  /// Writes the rows of a frame. If the frame is older than the state, the estimate and its error
+  /// are not written, because they belong to a later timestamp. Error: kIo.
   void Add(const SourceFrame& frame, const State& state, const UpdateReport& report);
   /// Closes all files and completes recorded(). Error: kIo.
   void Close();
@@ -44,7 +45,7 @@ class EstimatorFiles {
 
   static RecordedEstimator Describe(const EstimatorSpec& spec);
   void AddBlocks(const Problem& problem, const TruthLayout& truth);
-  /// Records the elements of the position from which landmarks are observed.
+  /// Records which sensors have reprojection errors, and which block is the camera position.
   void RecordPositionElements(const Problem& problem);
   void OpenEstimates(const OutputFolder& folder, RunColumns& run_columns);
   GainLayout AddGains(const Problem& problem);
@@ -61,7 +62,7 @@ class EstimatorFiles {
   std::vector<Timestamp> last_measured_;  ///< timestamp of the last measurement of each sensor
   std::optional<CsvFile> estimates_, innovations_, gains_, reprojection_;
   std::optional<ErrorsFile> errors_;
-  std::optional<PosePlace> pose_;  ///< indices of the pose among the blocks
+  std::optional<PosePlace> pose_;  ///< indices of the blocks of the pose
   std::optional<PoseFile> trajectory_, trajectory_covariance_;
   std::unique_ptr<OutputFile> covariances_;  ///< covariance.bin; null if not requested
 };

@@ -15,7 +15,7 @@ Mark MarkOf(Outcome outcome) {
 }
 
 std::vector<ViewFeature> FeatureTrails::Add(const Frame& frame, const UpdateReport* report) {
-  constexpr std::size_t kMaxTrail = 8;  // number of earlier positions of a feature
+  constexpr std::size_t kMaxTrail = 8;  // maximum number of earlier positions of a feature
   std::vector<ViewFeature> features;
   std::map<std::int64_t, Trail> current_trails;
   for (const Measurement& m : frame.measurements) {

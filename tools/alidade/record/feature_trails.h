@@ -15,13 +15,13 @@ namespace alidade::internal {
 /// Returns the mark that represents the outcome of a measurement in an image.
 Mark MarkOf(Outcome outcome);
 
-/// Record of the image features of recent frames: positions, and whether a measurement was
-/// accepted.
+/// Stores the positions of image features in recent frames, and which features have had an accepted
+/// measurement.
 class FeatureTrails {
  public:
-  /// Adds a frame. Returns the features of the frame, and the features of the previous frame that
-  /// are lost. A feature is a landmark measurement whose first two values are a pixel. `report` is
-  /// null if no estimator processed the frame.
+  /// Adds a frame. Returns the features of the frame and the lost features. A lost feature was in
+  /// the previous frame, but is not in this frame. A feature is a landmark measurement whose first
+  /// two values are a pixel. `report` is null if no estimator processed the frame.
   std::vector<ViewFeature> Add(const Frame& frame, const UpdateReport* report);
 
  private:

@@ -12,8 +12,9 @@
 namespace alidade {
 
 /// Observer that writes each estimate immediately, as a line of JSON for each frame and estimator.
-/// The keys are `t_s`, `estimator`, then `owner.block.element` and `sigma:owner.block.element` of
-/// each block with a value. The estimates of an offline estimator are written after the last frame.
+/// The keys are `t_s` and `estimator`, followed by `owner.block.element` and
+/// `sigma:owner.block.element` for each block that has a value. The estimates of an offline
+/// estimator are written after the last frame.
 class Follower : public RunObserver {
  public:
   /// Calls `write` with each line, including the line end.

@@ -11,10 +11,10 @@ std::unique_ptr<ImageWriter> OpenImageWriter(const ImageArguments& arguments,
   const void* const factory = internal::FactoryOnDemand(
       kImageWriterKind, window ? "image_window" : "images", folder,
       ErrorLine({arguments.shown}, {},
-                window ? "this build of alidade does not include windows"
-                       : "this build of alidade does not include images",
-                "a build with OpenCV: apt-get install libopencv-dev, then configure and build "
-                "again"));
+                window ? "this build of alidade cannot open windows"
+                       : "this build of alidade cannot write images",
+                "a build with OpenCV: run 'apt-get install libopencv-dev', then configure and "
+                "build again"));
   return static_cast<const ImageWriterEntry*>(factory)->create(arguments);
 }
 

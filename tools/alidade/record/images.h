@@ -14,7 +14,7 @@
 
 namespace alidade {
 
-/// Writer of camera images, frame by frame: to a video, a folder or a window.
+/// Writer of camera images. It writes an image for each frame to a video, a folder or a window.
 class ImageWriter {
  public:
   virtual ~ImageWriter() = default;
@@ -52,7 +52,7 @@ constexpr CppEntry EntryOf(const ImageWriterEntry& writer) {
 
 /// Creates an image writer with the C++ plugin in `folder`. If `folder` is empty, the plugin that
 /// was built with this library is used. The plugin is loaded at the first use, because the
-/// libraries that it needs load slowly. Windows have a separate plugin. Errors: kPlugin,
+/// libraries that it needs load slowly. A separate plugin opens windows. Errors: kPlugin,
 /// kNotTrusted, kCannotCreate, kIo.
 std::unique_ptr<ImageWriter> OpenImageWriter(const ImageArguments& arguments,
                                              const std::filesystem::path& folder = {});

@@ -14,8 +14,8 @@ namespace alidade::internal {
 /// Counts the landmarks for a figure of the map.
 RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks);
 
-/// Returns all landmarks of an estimator, sorted by id and generation. Removed landmarks have their
-/// last estimates. The result is empty if `result` has no map.
+/// Returns all landmarks of an estimator, sorted by id and generation. A removed landmark has its
+/// last estimate. The result is empty if `result` has no map.
 std::vector<LandmarkEstimate> AllLandmarks(const EstimatorResult& result);
 
 /// Writes `NAME/landmarks.csv`. The cell of a number that is not finite is empty. Error: kIo.

@@ -18,7 +18,7 @@ namespace alidade::internal {
 class LogFile {
  public:
   explicit LogFile(const OutputFolder& folder);
-  /// Flushes the file. Later messages are not recorded.
+  /// Closes the file. Later messages are not recorded. If a write has failed, logs a warning.
   void Close();
 
  private:
@@ -27,7 +27,7 @@ class LogFile {
 
   const std::thread::id thread_ = std::this_thread::get_id();
   std::unique_ptr<OutputFile> file_;  ///< null: the file is closed, or a write has failed
-  std::string failure_;               ///< reason of the failure
+  std::string failure_;               ///< message of the failed write; "": no failure
   std::optional<LogSubscription> subscription_;
 };
 

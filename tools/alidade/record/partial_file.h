@@ -9,8 +9,8 @@
 
 namespace alidade::internal {
 
-/// Video file that gets its final name when it is complete. Until then the name is
-/// `NAME.partial.avi` in the same folder.
+/// Video file that has the name `NAME.partial.avi` until it is complete. It is then renamed to its
+/// final name in the same folder.
 class PartialFile {
  public:
   PartialFile(std::filesystem::path file, bool force)
@@ -20,7 +20,7 @@ class PartialFile {
     for (const std::filesystem::path& path : {file_, partial_}) {
       if (force || !std::filesystem::exists(path, ignored)) continue;
       throw Error(ExitCode::kCannotCreate,
-                  ErrorLine({path.string()}, {}, "exists; --force replaces it"));
+                  ErrorLine({path.string()}, {}, "the file exists; --force replaces it"));
     }
     OutputFile(partial_).Close();
   }

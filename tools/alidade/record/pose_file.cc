@@ -41,7 +41,8 @@ void AppendUpper(std::string& row, const Eigen::MatrixXd& covariance) {
   }
 }
 
-/// Returns true if `value` is the orientation of the body `prefix` and has `size` numbers.
+/// Returns true if `value` has `size` numbers, and its name is `prefix` followed by the name of an
+/// orientation.
 bool IsOrientation(const StreamInfo& value, const std::string& prefix, int size) {
   if (value.size != size || !value.name.starts_with(prefix)) return false;
   const std::string_view name = std::string_view(value.name).substr(prefix.size());

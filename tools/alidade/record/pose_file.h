@@ -12,8 +12,9 @@
 
 namespace alidade::internal {
 
-/// Indices of the position and of the orientation of a pose. These are three numbers and a
-/// quaternion; for a planar pose, two numbers and an angle about z.
+/// Indices of the position and of the orientation of a pose in a list of values. The position has
+/// three numbers, and the orientation is a quaternion. In a planar pose, the position has two
+/// numbers, and the orientation is an angle about z.
 struct PosePlace {
   std::size_t position, orientation;
   bool planar = false;
@@ -24,8 +25,7 @@ struct PosePlace {
 std::optional<PosePlace> FindPose(const std::vector<StreamInfo>& values);
 
 /// Writer of a pose file in TUM format, `t x y z qx qy qz qw`, with or without covariances. A
-/// planar pose is written with z = 0, with a rotation about z, and with zero variance in the other
-/// axes.
+/// planar pose is written with z = 0, a rotation about z, and zero variances for the other axes.
 class PoseFile {
  public:
   /// Creates the file and writes a comment line with the names of the columns. Errors:
@@ -42,7 +42,7 @@ class PoseFile {
   void Add(Timestamp timestamp, const double* position, const double* orientation,
            const Eigen::MatrixXd& position_covariance,
            const Eigen::MatrixXd& orientation_covariance);
-  /// Writes the true pose of a frame, if it is known.
+  /// Writes the true pose of a frame, if the pose is known.
   void AddTruth(const SourceFrame& frame);
   void Close();
 

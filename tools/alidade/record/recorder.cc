@@ -39,8 +39,8 @@ struct Recorder::Impl {
   void WriteEvents(const EstimatorResult& result);
   std::string TimingJson(const RunResult& result) const;
   void WriteReport(const RunResult& result);
-  /// Writes all files except run.json. Returns the error that occurred in writing the report, or
-  /// null.
+  /// Writes all files except run.json. Returns the error that occurred while the report was
+  /// written, or null if there was no error.
   std::exception_ptr WriteResults(const RunResult& result);
 
   Options options;
@@ -66,17 +66,17 @@ namespace {
 constexpr const char* kRunFile = "run.json";
 constexpr const char* kColumnsFile = "columns.json";
 
-/// Names in timing.json, indexed by FramePart.
+/// Names of the parts of a frame in timing.json, indexed by FramePart.
 constexpr std::array<const char*, kFrameParts> kPartNames = {"step", "evaluate", "gate", "update",
                                                              "landmarks"};
 
-/// Returns the text of a key. Returns `fallback` if the key does not exist.
+/// Returns the text of `key` in `map`. Returns `fallback` if the key does not exist.
 std::string TextOf(const Node& map, std::string_view key, const std::string& fallback) {
   const std::optional<Node> node = map.is_map() ? map.Find(key) : std::nullopt;
   return node && node->kind() == Node::Kind::kScalar ? node->Text() : fallback;
 }
 
-/// Returns the svg element of the text of an SVG file, without the XML prolog.
+/// Returns the svg element in the text of an SVG file, without the XML prolog.
 std::string SvgElement(const std::string& svg) {
   const std::size_t start = svg.find("<svg");
   return start == svg.npos ? "" : svg.substr(start);
@@ -163,7 +163,7 @@ void Recorder::Impl::WriteReport(const RunResult& result) {
   }
   for (const internal::Figure& figure : report.figures.drawn) {
     const std::string svg = "figures/" + figure.name + ".svg";
-    // A figure with wall-clock times is only linked, to keep the page reproducible.
+    // The page only links a figure with wall-clock times, so that the page itself is reproducible.
     report.svgs[figure.name] =
         internal::HasWallClock(svg)
             ? "<img src=\"" + svg + "\" alt=\"" + figure.title + "\">"

@@ -15,9 +15,9 @@ namespace alidade {
 
 /// Writer of a run folder (docs/run_folder.md). During the run the folder is `FOLDER.partial`, and
 /// `run.json` has the status `running`. After the run the folder is renamed. If the run failed,
-/// `run.json` contains the reason. If the folder cannot be finished (full disk, killed process),
-/// `FOLDER.partial` remains with the rows so far, unless the run had no frame. Every write is
-/// checked. Errors: kCannotCreate, kIo with the path.
+/// `run.json` contains the reason. If the folder cannot be completed (full disk, killed process),
+/// `FOLDER.partial` remains and contains the rows written so far. An error before the first frame
+/// removes it. Every write is checked. Errors: kCannotCreate, kIo with the path.
 class Recorder : public RunObserver {
  public:
   struct Options {
@@ -25,11 +25,11 @@ class Recorder : public RunObserver {
     bool force = false;               ///< true: replaces an existing folder
     bool figures = true;              ///< true: draws figures, if gnuplot is installed
     std::string command;              ///< command line of the program, for timing.json
-    std::function<bool()> stop = {};  ///< if it returns true, the remaining figures are skipped
+    std::function<bool()> stop = {};  ///< returns true to skip the remaining figures
     double drawing_s = 60.0;          ///< time limit for all figures together, s
     bool covariances = false;         ///< true: also writes `NAME/covariance.bin`
     std::string inputs = {};          ///< text of inputs.json; "": the file is not written
-    /// Plugins for run.json: file name -> SHA-256.
+    /// Plugins that run.json lists: file name -> SHA-256.
     std::multimap<std::string, std::string> plugins = {};
   };
   /// Creates `FOLDER.partial`. Error: kCannotCreate if `FOLDER.partial` or `FOLDER` exists and
@@ -47,9 +47,9 @@ class Recorder : public RunObserver {
                   const UpdateReport& report) override;
   /// Adds a file to the folder. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, std::string_view text);
-  /// Completes the folder: closes the files of the frames, writes all other files with run.json
-  /// last, and renames the folder. If a figure or the report cannot be written, the folder is
-  /// completed without figures and report. The error is then thrown.
+  /// Completes the folder: closes the files with data of frames, writes all other files, run.json
+  /// last, and renames the folder. If a figure or the report cannot be written, completes the
+  /// folder without figures and report, and then throws the error.
   void Finish(const RunResult& result);
 
   /// Returns the paths of the most important files that Finish() wrote, relative to the folder.

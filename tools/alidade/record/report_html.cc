@@ -15,7 +15,7 @@ std::string Element(const std::string& tag, std::string_view text) {
   return '<' + tag + '>' + HtmlEscaped(text) + "</" + tag + ">\n";
 }
 
-/// Returns a table of two columns.
+/// Returns a heading and a table of two columns: key and value.
 template <class Map, class Print>
 std::string Pairs(const std::string& heading, const Map& values, const Print& print) {
   if (values.empty()) return {};
@@ -70,7 +70,8 @@ std::string Comparison(const RunResult& result, const std::vector<std::string>& 
   }
   return html +
          "<p class=\"soft\">NEES and NIS are divided by their degrees of freedom: "
-         "1 is consistent, a larger value is overconfident. A positive lag is a delay.</p>\n";
+         "about 1 means consistent, a larger value means overconfident. "
+         "A positive lag means that the estimate is delayed.</p>\n";
 }
 
 std::string FiguresOf(const Report& report, const std::string& estimator) {
@@ -99,8 +100,9 @@ std::string Events(const EstimatorResult& result) {
   }
   html += "</table></div>\n";
   if (result.events.size() <= kMaxEvents) return html;
-  return html + "<p class=\"soft\">and " + std::to_string(result.events.size() - kMaxEvents) +
-         " more, in " + HtmlEscaped(result.name) + "/events.csv</p>\n";
+  return html + "<p class=\"soft\">Events not shown: " +
+         std::to_string(result.events.size() - kMaxEvents) + "; the whole list is in " +
+         HtmlEscaped(result.name) + "/events.csv</p>\n";
 }
 
 std::string Estimator(const EstimatorResult& result, std::size_t index, const Report& report) {

@@ -13,15 +13,15 @@ namespace alidade::internal {
 
 struct Report {
   std::string title;
-  std::string config;  ///< config as YAML
+  std::string config;  ///< text of the config, YAML
   RunFacts facts;
   Figures figures;
-  std::map<std::string, std::string> svgs;  ///< SVG element of each figure, by name of the figure
+  std::map<std::string, std::string> svgs;  ///< SVG element of each figure; key: name of figure
   std::vector<std::string> subjects = {};   ///< result of SubjectsOf(experiment)
 };
 
-/// Returns a self-contained page without scripts and wall-clock times. Figure `timing` is only
-/// linked.
+/// Returns a self-contained page without scripts and wall-clock times. The page links the figure
+/// `timing` instead of containing it.
 std::string ReportHtml(const RunResult& result, const Report& report);
 
 /// Converts `text` with PrintableUtf8(), and escapes the special characters of HTML.

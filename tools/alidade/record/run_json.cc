@@ -12,8 +12,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns the entry of one estimator. `recorded` is null if the run ended before the files were
-/// created.
+/// Returns the entry of one estimator in run.json. `recorded` is null if the run ended before the
+/// files were created.
 Json JsonOf(const EstimatorResult& result, const RecordedEstimator* recorded) {
   Json json = {{"type", result.type}, {"kind", ToString(result.kind)}};
   if (!result.accepted_by.empty()) json["accepted_by"] = result.accepted_by;

@@ -17,7 +17,7 @@ namespace alidade {
 enum class Mark {
   kAccepted,
   kRejected,  ///< rejected by the gate or by outlier rejection
-  kNew,       ///< used for an initialisation, or stored for a later one
+  kNew,       ///< used for an initialisation, or stored for a later initialisation
   kLost,      ///< measured in the previous frame, but not in this frame
   kUnused,    ///< not used by a sensor
 };
@@ -32,8 +32,8 @@ struct PlaneGaussian {
 /// Feature in the image, px. The centre of the upper left pixel is (0, 0).
 struct ViewFeature {
   Mark mark;
-  std::array<double, 2> pixel;             ///< measured pixel; for a lost feature, the last one
-  std::optional<PlaneGaussian> predicted;  ///< predicted pixel h with covariance S
+  std::array<double, 2> pixel;                    ///< pixel of the last measurement
+  std::optional<PlaneGaussian> predicted;         ///< predicted pixel h with covariance S
   std::vector<std::array<double, 2>> trail = {};  ///< pixels in earlier frames
 };
 
@@ -51,7 +51,7 @@ struct ViewElement {
   double value, sigma, truth;
 };
 
-/// Trajectory and landmarks from above, m.
+/// Trajectory and landmarks, viewed from above, m.
 struct ViewMap {
   std::string right, up;  ///< names of the axes
   std::vector<std::array<double, 2>> path, true_path;

@@ -34,7 +34,7 @@ int FirstOnline(const Experiment& experiment) {
               ErrorLine({}, "estimators",
                         "each estimator needs all frames before its first estimate, so no estimate "
                         "can be shown with an image",
-                        "a recursive estimator, such as ekf"));
+                        "at least one recursive estimator, such as ekf"));
 }
 
 }  // namespace
@@ -43,15 +43,15 @@ struct RunViewer::Impl {
   const EstimatorSpec* spec;
   int estimator;
   Source* source;
-  std::vector<int> truth_of;  ///< truth of each block of the problem; -1: none
+  std::vector<int> truth_of;  ///< index of the truth of each block; -1: none
   std::optional<internal::PosePlace> pose;
   std::vector<std::unique_ptr<internal::PartialFile>>
-      videos;  ///< declared before the writers, to outlive them
+      videos;  ///< declared before `writers`, so that the files outlive the writers
   std::vector<std::unique_ptr<ImageWriter>> writers;
   RunView view;
   internal::FeatureTrails trails;
   internal::MapFromAbove map_from_above;
-  std::optional<SourceFrame> pending;  ///< frame without an estimate so far
+  std::optional<SourceFrame> pending;  ///< last frame, if its estimate is still missing
 
   void Write() {
     for (const auto& writer : writers) writer->Add(view);
@@ -75,13 +75,13 @@ RunViewer::RunViewer(const Experiment& experiment, const std::string& title)
   if (!experiment.source->measures_images() && experiment.source->views() == 0) {
     throw Error(ExitCode::kBadConfig,
                 ErrorLine({}, "source", "the source has no images to show",
-                          "a source that measures in images, or draws images from `surfaces`"));
+                          "a source with images, such as image_tracks, or scene with `surfaces`"));
   }
   if (experiment.out_of_sequence.policy != OutOfSequence::kReject) {
     throw Error(ExitCode::kBadConfig,
                 ErrorLine({}, "out_of_sequence.policy",
-                          "frames are not processed in the order of their images",
-                          "'reject' for a run with a view"));
+                          "this policy reorders frames, so their images cannot be shown",
+                          "'reject' for a run that shows its images"));
   }
   impl_->estimator = FirstOnline(experiment);
   impl_->spec = &experiment.estimators[static_cast<std::size_t>(impl_->estimator)];
@@ -111,7 +111,7 @@ void RunViewer::AddVideo(const std::filesystem::path& file, bool force) {
 void RunViewer::AddWindow() {
   if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) {
     throw Error(ExitCode::kCannotCreate,
-                ErrorLine({}, "--view", "there is no display: DISPLAY is not set",
+                ErrorLine({}, "--view", "there is no display, because DISPLAY is not set",
                           "a graphical session; --save-video FILE.avi does not need a display"));
   }
   impl_->writers.push_back(OpenImageWriter(

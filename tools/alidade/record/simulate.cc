@@ -142,8 +142,8 @@ class DataFiles {
   std::set<std::string> names_;
 };
 
-/// Writer of the images of a simulation. The source draws the images. If it cannot draw, the images
-/// contain discs at the landmarks.
+/// Writer of the images of a simulation. The source draws the images. If the source cannot draw,
+/// the images contain discs at the landmarks.
 class ImageFiles {
  public:
   ImageFiles(const SimulateImages& names, const Config& config, const OutputFolder& folder,
@@ -204,8 +204,9 @@ class ImageFiles {
   static std::filesystem::path Inside(const std::string& name, const char* option) {
     const std::filesystem::path path = std::filesystem::path(name).lexically_normal();
     if (path.is_absolute() || *path.begin() == "..") {
-      throw Error(ExitCode::kNotTrusted, ErrorLine({}, option, "'" + name + "' leaves its folder",
-                                                   "a path inside the output folder"));
+      throw Error(ExitCode::kNotTrusted,
+                  ErrorLine({}, option, "'" + name + "' is outside the output folder",
+                            "a relative path inside this folder"));
     }
     return path;
   }
@@ -218,7 +219,7 @@ class ImageFiles {
   }
 
   Source& source_;
-  std::vector<std::vector<std::unique_ptr<ImageWriter>>> writers_;  ///< writers of each view
+  std::vector<std::vector<std::unique_ptr<ImageWriter>>> writers_;  ///< writers for each view
   std::vector<std::string> names_;
   std::vector<std::array<double, 2>> pixels_;
 };

@@ -12,13 +12,13 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns the names of the columns of truth.csv for each truth and element.
+/// Returns, for each truth, the names of the columns of its elements in truth.csv.
 std::vector<std::vector<std::string>> TruthColumns(const Experiment& experiment) {
   const std::vector<StreamInfo>& truths = experiment.source->truths();
   std::vector<std::vector<std::string>> columns;
   for (std::size_t t = 0; t < truths.size(); ++t) {
     std::vector<std::string> names = NumberedNames(truths[t].name, truths[t].size);
-    // The names of the elements are those in the first estimator whose state contains this block.
+    // The first estimator whose state contains the block determines the names of its elements.
     for (const EstimatorSpec& spec : experiment.estimators) {
       const StateLayout& layout = spec.problem.layout;
       const std::vector<int> match = MatchTruths(layout, truths);

@@ -14,13 +14,13 @@
 
 namespace alidade::internal {
 
-/// Writer of the data of the source:
+/// Writer of the files with the data of the source:
 ///
 ///   measurements.csv     always
-///   truth.csv            if there are truths
-///   expected.csv         if the truths determine the measurement of a sensor
-///   implied_states.csv   if a sensor can be inverted, from the measurement alone or with the truth
-///                        of the other roles
+///   truth.csv            if the source provides true values
+///   expected.csv         if the true values determine the prediction of a sensor
+///   implied_states.csv   if a measurement determines the value of a block, alone or together with
+///                        the true values of the other roles
 class SourceFiles {
  public:
   SourceFiles(const OutputFolder& folder, const Experiment& experiment, RunColumns& run_columns);
@@ -38,7 +38,8 @@ class SourceFiles {
     ImpliedState state;
     RecordedImplied recorded;
   };
-  /// Model of the first sensor of a stream for which all roles have a truth.
+  /// Model of a sensor whose roles all have a truth; the first such sensor of its stream. `truths`
+  /// contains the index of the truth of each role.
   struct Expectation {
     SharedSensor model;
     std::vector<int> truths;

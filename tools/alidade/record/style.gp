@@ -32,15 +32,15 @@ set style line 20 pt 7 ps 0.5 lc rgb '#b294d0'
 set style line 21 pt 6 ps 0.8 lw 0.7 lc rgb '#aaaaaa'
 max(a, b) = a > b ? a : b
 min(a, b) = a < b ? a : b
-# What a range is widened by at each end; never zero.
+# Returns the length by which a range is widened at each end. It is never zero.
 margin(low, high) = high > low ? max(0.08 * (high - low), 1e-6 * max(abs(low), abs(high))) : \
                     low == 0 ? 1 : 0.1 * abs(low)
-# 1, 2 or 5 times a power of ten, about x.
+# Returns the number nearest to x that is 1, 2 or 5 times a power of ten.
 tic_step(x) = (power = 10**floor(log10(x)), \
                x < 1.5 * power ? power : x < 3.5 * power ? 2 * power : \
                x < 7.5 * power ? 5 * power : 10 * power)
-# A line through those rows of a file that are `mine`, broken where none comes for a time: along()
-# is its x, level() its y.
+# Functions for a line through the rows of a file for which `mine` is true: along() returns x, and
+# level() returns y. The line is interrupted between rows that are more than `gap` apart.
 along(mine, t) = (row = mine, jump = mine && t - px > gap, px = mine ? t : px)
 level(value) = (py = jump ? NaN : row ? value : py)
-before = 0  # of an angle, the value at the row before
+before = 0  # value of an angle in the previous row

@@ -36,7 +36,7 @@ void TimingFile::AddTime(int estimator, double wall_s) {
 
 void TimingFile::EndRow() {
   const Timestamp timestamp =
-      std::exchange(timestamp_, kNoTimestamp);  // write only once, even if the write fails
+      std::exchange(timestamp_, kNoTimestamp);  // the row is written once, even if this fails
   if (timestamp == kNoTimestamp) return;
   WriteCells(kTimingColumns, layout_, {timestamp, row_}, *file_);
   std::ranges::fill(row_, std::nullopt);

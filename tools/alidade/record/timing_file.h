@@ -28,7 +28,7 @@ class TimingFile {
   void EndRow();
 
   std::vector<RecordedTimes> times_;
-  std::vector<int> column_of_;              ///< column of each estimator; -1: none
+  std::vector<int> column_of_;              ///< column of each estimator; -1: offline
   std::vector<std::optional<double>> row_;  ///< time in each column
   Timestamp timestamp_ = kNoTimestamp;      ///< timestamp of the current row
   TimingLayout layout_;
@@ -36,7 +36,8 @@ class TimingFile {
 };
 
 /// Returns figure `timing`: the wall-clock time of each frame over time, and the frame period. The
-/// key reports wall-clock time / frame period. The figure is empty if no time is known.
+/// key of each curve reports the ratio of wall-clock time to frame period. The figure is empty if
+/// no time is known.
 FigureScript TimingFigure(const RecordedRun& run);
 
 }  // namespace alidade::internal

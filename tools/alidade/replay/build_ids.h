@@ -6,11 +6,12 @@
 
 namespace alidade::internal {
 
-/// Returns the identities of the code in this process that affects the results, by name: the
-/// program, the libraries of alidade and the C mathematics library. The identity of a file is the
-/// build id from the linker. Without a build id, it is the SHA-256 of the file. `processor` lists
-/// the instruction sets by which the mathematics library selects code. `kernels` is the
-/// BestInstructionSet(). Error: kUsage if ALIDADE_KERNELS is not the name of an instruction set.
+/// Identifies the code in this process that affects the results: the program, the libraries of
+/// alidade and the C mathematics library. Returns an identity for each file name. The identity is
+/// the build id from the linker. For a file without a build id, the identity is the SHA-256 of the
+/// file. The entry `processor` lists the instruction sets for which the mathematics library selects
+/// code. The entry `kernels` is the BestInstructionSet(). Error: kUsage if ALIDADE_KERNELS is not
+/// the name of an instruction set.
 std::map<std::string, std::string> BuildIds();
 
 }  // namespace alidade::internal

@@ -53,8 +53,8 @@ std::ifstream OpenIfExists(const std::filesystem::path& file) {
 }  // namespace
 
 std::string RowDifference::Text() const {
-  if (only_line_end) return "line end";
-  if (recorded.empty() && current.empty()) return "other bytes";
+  if (only_line_end) return "the line end differs";
+  if (recorded.empty() && current.empty()) return "the bytes differ";
   return "now '" + current + "', was '" + recorded + '\'';
 }
 

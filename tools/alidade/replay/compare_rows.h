@@ -13,12 +13,13 @@ namespace alidade::internal {
 /// First difference between two files.
 struct RowDifference {
   std::int64_t line = 0, column = 0;  ///< position in the files, counted from 1
-  /// Cell of each file at that position, truncated if it is long. It is empty if the cell is not
-  /// printable text.
+  /// Cell of each file at this position. A long cell is truncated. The text is empty if the cell is
+  /// not printable text.
   std::string recorded, current;
   bool only_line_end = false;  ///< true: the files differ only in the last line end
 
-  /// Describes the difference as `now '0.51', was '0.5'`, `other bytes`, or `line end`.
+  /// Describes the difference, as in `now '0.51', was '0.5'`, `the bytes differ` or `the line end
+  /// differs`.
   std::string Text() const;
 };
 

@@ -19,7 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Returns `status` from a JSON file. Returns "" if the file cannot be read or has no status.
+/// Returns the value of `status` in a JSON file. Returns "" if the file cannot be read or does not
+/// contain a status.
 std::string StatusIn(const fs::path& file) {
   const std::string text = ReadFile(file, [](ExitCode, int) {});
   if (text.empty()) return "";
@@ -53,7 +54,7 @@ RecordedInputs ReadReplayable(const fs::path& folder) {
   if (arguments.empty() || (arguments[0] != "run" && arguments[0] != "sweep")) {
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{file.string()}, "arguments", "the command does not create a folder",
-                          "run or sweep"));
+                          "the command run or sweep"));
   }
   if (!inputs.read_once.empty()) {
     throw Error(ExitCode::kInputMissing, ErrorLine(Place{folder.string()}, {},
@@ -65,7 +66,8 @@ RecordedInputs ReadReplayable(const fs::path& folder) {
   if (status.empty() || status == "running" || status == "stopped") {
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{folder.string()}, {},
-                          status == "stopped" ? "was stopped before it finished" : "is incomplete",
+                          status == "stopped" ? "the run or sweep was stopped before it finished"
+                                              : "the run or sweep is not finished",
                           "the folder of a finished run or sweep"));
   }
   return inputs;
@@ -93,11 +95,11 @@ ReplayResult CompareReplay(const fs::path& recorded, const fs::path& current) {
     ++result.files;
     if (name == kInputsFile && !result.inputs.empty()) continue;
     if (!fs::exists(recorded / name, ignored)) {
-      result.differences.push_back({name, 0, 0, "has been removed"});
+      result.differences.push_back({name, 0, 0, "the recorded file has been removed"});
       continue;
     }
     if (!is_written) {
-      result.differences.push_back({name, 0, 0, "is not written any more"});
+      result.differences.push_back({name, 0, 0, "the replay does not write this file"});
       continue;
     }
     const RowComparison rows = CompareRows(recorded / name, current / name);
@@ -105,15 +107,15 @@ ReplayResult CompareReplay(const fs::path& recorded, const fs::path& current) {
       result.differences.push_back(
           {name, rows.difference->line, rows.difference->column, rows.difference->Text()});
     } else if (rows.recorded_has_more || rows.current_has_more) {
-      result.differences.push_back(
-          {name, rows.rows + 1, 1,
-           rows.current_has_more ? "has more rows now" : "now ends before this row"});
+      result.differences.push_back({name, rows.rows + 1, 1,
+                                    rows.current_has_more ? "the file now has more rows"
+                                                          : "the file now ends before this row"});
     }
   }
   for (const std::string& name : new_files) {
     if (HasWallClock(name)) continue;
     ++result.files;
-    result.differences.push_back({name, 0, 0, "is new"});
+    result.differences.push_back({name, 0, 0, "the file is new"});
   }
   return result;
 }

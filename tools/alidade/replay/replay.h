@@ -15,8 +15,8 @@ namespace alidade::internal {
 
 struct FileDifference {
   std::string file;  ///< path relative to the folder
-  std::int64_t line = 0,
-               column = 0;  ///< position of the first difference; 0: the whole file differs
+  /// Position of the first difference. 0: the whole file differs.
+  std::int64_t line = 0, column = 0;
   std::string description;  ///< description, as in `now '0.51', was '0.5'`
 };
 

@@ -27,7 +27,7 @@ std::string HashOf(const fs::path& file) {
   std::string hash = Sha256OfFile(file);
   if (hash.empty()) {
     throw Error(ExitCode::kIo,
-                ErrorLine(Place{file.string()}, {}, "cannot be read to compute its hash"));
+                ErrorLine(Place{file.string()}, {}, "the file cannot be read to compute its hash"));
   }
   return hash;
 }
@@ -41,7 +41,7 @@ std::string FileEntry(const fs::path& file) {
          ", \"sha256\": " + JsonString(HashOf(file)) + '}';
 }
 
-/// Returns a list in brackets, with one text in each line.
+/// Returns a list in brackets. Each line contains one text.
 std::string BracketedList(char open, const std::vector<std::string>& texts, char close) {
   std::string list(1, open);
   for (const std::string& text : texts) {
@@ -59,7 +59,7 @@ std::vector<std::string> JsonStrings(const std::vector<std::string>& texts) {
 
 /// Returns the value of `source.path`. Returns "" if the config does not contain this key.
 std::string SourcePath(const Config& config) {
-  const Config copy = config.Copy();  // a query marks keys as read; use a copy
+  const Config copy = config.Copy();  // a copy, because a query marks keys as read
   const auto source = copy.root().is_map() ? copy.root().Find("source") : std::nullopt;
   const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
   return path && path->kind() == Node::Kind::kScalar ? path->Text() : "";
@@ -128,7 +128,7 @@ auto ReadJsonText(const std::string& text, const std::string& file, const F& rea
     return read(json);
   } catch (const Json::exception&) {
     throw Error(ExitCode::kBadData,
-                ErrorLine(Place{file}, {}, "is not the inputs.json of a run of this version"));
+                ErrorLine(Place{file}, {}, "this is not an inputs.json of this alidade version"));
   }
 }
 
@@ -152,7 +152,7 @@ InputValues InputValuesOf(const Json& json) {
   return values;
 }
 
-/// Shortens a hash to the first digits. Puts any other text in quotes.
+/// Shortens a hash to the first digits. Encloses any other text in quotes.
 std::string Shortened(const std::string& text) {
   constexpr std::size_t kMinHashLength = 40, kShownDigits = 12;
   const bool is_hash =
@@ -165,7 +165,7 @@ std::string Shortened(const std::string& text) {
 std::vector<fs::path> FindUsedPlugins(const std::vector<Config>& configs, const PluginHost& host) {
   PluginNames names;
   for (const Config& config : configs) {
-    const Config copy = config.Copy();  // a query marks keys as read; use a copy
+    const Config copy = config.Copy();  // a copy, because a query marks keys as read
     AddNames(copy.root(), names);
   }
   std::vector<fs::path> files;
@@ -233,14 +233,16 @@ std::vector<std::string> InputDifferences(const std::string& recorded, const std
   for (const auto& [name, value] : current_values) {
     const auto found = recorded_values.find(name);
     if (found == recorded_values.end()) {
-      differences.push_back(name + ": new");
+      differences.push_back(name + ": this input is new");
     } else if (found->second != value) {
       differences.push_back(name + ": now " + Shortened(value) + ", was " +
                             Shortened(found->second));
     }
     recorded_values.erase(name);
   }
-  for (const auto& [name, value] : recorded_values) differences.push_back(name + ": missing now");
+  for (const auto& [name, value] : recorded_values) {
+    differences.push_back(name + ": this input is missing now");
+  }
   return differences;
 }
 
@@ -248,9 +250,10 @@ InputTexts ReadInputTexts(const fs::path& folder) {
   const auto read = [&folder](const char* name) {
     const fs::path file = folder / name;
     return ReadFile(file, [&](ExitCode code, int error) {
-      throw Error(code, ErrorLine(Place{file.string()}, {},
-                                  "cannot be read: " + std::generic_category().message(error),
-                                  "a folder written by `alidade run` or `alidade sweep`"));
+      throw Error(code,
+                  ErrorLine(Place{file.string()}, {},
+                            "the file cannot be read: " + std::generic_category().message(error),
+                            "a folder written by `alidade run` or `alidade sweep`"));
     });
   };
   InputTexts texts;

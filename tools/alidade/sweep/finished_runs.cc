@@ -21,7 +21,7 @@ FinishedRuns::FinishedRuns(OutputFolder& folder) : folder_(folder) {
     std::optional<ParsedRunLine> parsed = ReadRunLine(line);
     if (!parsed) {
       throw Error(ExitCode::kBadData,
-                  ErrorLine(place, {}, "is not the record of a run", "one run as JSON"));
+                  ErrorLine(place, {}, "the line is not the record of a run", "one run as JSON"));
     }
     const std::uint64_t seed = parsed->run.seed;
     parsed->run.ShareNames(names);

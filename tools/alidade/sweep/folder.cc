@@ -116,7 +116,7 @@ RunResult AllKeys(const Parts& parts) {
   return result;
 }
 
-/// Returns `header`. If a key is varied, it is inserted as the first column.
+/// Returns `header`. If a key is varied, the key is inserted as the first column.
 std::vector<std::string> Header(const std::string& key, std::vector<std::string> header) {
   if (!key.empty()) header.insert(header.begin(), key);
   return header;
@@ -145,7 +145,7 @@ class Columns {
  private:
   std::vector<std::string> names_;
   std::map<std::string, std::size_t> columns_;  ///< index of each column, by name
-  /// For each list of names, by its address: the column of each name.
+  /// Column of each name in a list of names. The key is the address of the list.
   std::unordered_map<const void*, std::vector<std::size_t>> columns_of_list_;
   std::vector<const Value*> cells_;
 };
@@ -217,8 +217,9 @@ void CheckInputs(const fs::path& partial, const internal::InputTexts& current) {
       internal::ReadInputTexts(partial), (partial / internal::kInputsFile).string(), current);
   if (difference.empty()) return;
   throw Error(ExitCode::kCannotCreate,
-              ErrorLine(Place{partial.string()}, {}, "was made from other inputs: " + difference) +
-                  "; to start again, remove it, or use --force without --resume");
+              ErrorLine(Place{partial.string()}, {},
+                        "the folder was made from other inputs: " + difference) +
+                  "; to start a new sweep, remove the folder, or use --force without --resume");
 }
 
 /// Removes the result files that a stopped sweep has written.

@@ -12,8 +12,9 @@
 /// Reprojection error over the frames of a varied sweep.
 namespace alidade::internal {
 
-/// Observer that records the RMS of the innovations z - h, h at the prediction, of each landmark
-/// sensor, as in `NAME/reprojection.csv`. Records only the first 500 frames of a run.
+/// Observer that records the RMS of the innovations z - h of each landmark sensor in each frame, as
+/// in `NAME/reprojection.csv`. h is evaluated at the prediction. Only the first 500 frames of a run
+/// are recorded.
 class ReprojectionRecorder : public RunObserver {
  public:
   void Begin(const Experiment& experiment) override;
@@ -31,13 +32,13 @@ class ReprojectionRecorder : public RunObserver {
   std::vector<SensorIndex> sensors_;  ///< sensor of each entry of errors_
 };
 
-/// Writes `reprojection.csv`: one row for each value, estimator, landmark sensor and frame, with
-/// the mean over the used runs (SweepRun::UsesMetricsOf). Without errors, the file is not written.
-/// Errors: kCannotCreate, kIo.
+/// Writes `reprojection.csv`. Each value, estimator, landmark sensor and frame has a row with the
+/// mean over the used runs (SweepRun::UsesMetricsOf). If there are no errors, the file is not
+/// written. Errors: kCannotCreate, kIo.
 void WriteReprojection(const OutputFolder& folder, const VariedSweep& sweep);
 
-/// Draws `figures/reprojection.svg` from reprojection.csv, with one curve for each value. Returns
-/// the reason if the drawing failed. Returns "" if the figure was drawn, or if there is nothing to
+/// Draws `figures/reprojection.svg` from reprojection.csv, with one curve for each value. If the
+/// drawing fails, returns the reason. Returns "" if the figure was drawn, or if there is nothing to
 /// draw. Error: kIo.
 std::string DrawReprojection(const OutputFolder& folder, const VariedSweep& sweep,
                              const std::function<bool()>& stop);

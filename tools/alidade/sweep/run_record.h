@@ -9,7 +9,7 @@
 namespace alidade::internal {
 
 /// Formats a finished or failed run as one line of JSON. The line contains all data of the run that
-/// the files of a sweep need. `value` is the value of the varied key; it is "" if no key is varied.
+/// the files of a sweep need. `value` is the value of the varied key, or "" if no key is varied.
 std::string RunLine(const std::string& value, const SweepRun& run);
 
 /// Contents of a line that RunLine() has formatted.

@@ -37,8 +37,9 @@ struct ShardFolder {
 
 std::string TextOf(const fs::path& file) {
   return ReadFile(file, [&](ExitCode code, int error) {
-    throw Error(code, ErrorLine(Place{file.string()}, {},
-                                "cannot be read: " + std::generic_category().message(error)));
+    throw Error(code,
+                ErrorLine(Place{file.string()}, {},
+                          "the file cannot be read: " + std::generic_category().message(error)));
   });
 }
 
@@ -63,14 +64,14 @@ std::string TextOf(const Shard& shard) {
 
 ShardFolder ReadShardFolder(const fs::path& folder) {
   if (!fs::exists(folder) && fs::exists(PartialOf(folder))) {
-    FailData(folder, "is not finished: its files are in " + PartialOf(folder).string(),
+    FailData(folder, "the sweep is not finished: its files are in " + PartialOf(folder).string(),
              "the folder of a finished sweep");
   }
   const RecordedInputs recorded = ReadReplayable(folder);
   const std::string text = ValueOf(recorded.command.arguments, "--shard");
   const fs::path inputs = folder / kInputsFile;
   if (recorded.command.arguments[0] != "sweep" || text.empty()) {
-    FailData(inputs, "is not the inputs.json of a shard",
+    FailData(inputs, "this is not the inputs.json of a shard",
              "a folder of `alidade sweep --shard i/n`");
   }
   ShardFolder shard_folder{folder, {}, recorded.command.arguments, {}};
@@ -80,7 +81,8 @@ ShardFolder ReadShardFolder(const fs::path& folder) {
   const auto runs = IntegerOf<std::int64_t>(ValueOf(shard_folder.arguments, "--runs"));
   const Shard& shard = shard_folder.shard;
   if (shard.index < 1 || shard.index > shard.count || shard.count > runs) {
-    FailData(inputs, "records the shard '" + text + "' of " + std::to_string(runs) + " runs",
+    FailData(inputs,
+             "the file records the shard '" + text + "' of " + std::to_string(runs) + " runs",
              "i/n with 1 <= i <= n, and at least one run for each shard");
   }
   shard_folder.input_texts = ReadInputTexts(folder);
@@ -92,7 +94,7 @@ ShardFolder ReadShardFolder(const fs::path& folder) {
 void CheckSameSweep(const ShardFolder& first, const ShardFolder& candidate) {
   if (candidate.shard.count != first.shard.count) {
     FailData(candidate.folder,
-             "is shard " + TextOf(candidate.shard) + ", but " + first.folder.string() +
+             "this is shard " + TextOf(candidate.shard) + ", but " + first.folder.string() +
                  " is shard " + TextOf(first.shard),
              "the shards of one sweep");
   }
@@ -100,7 +102,7 @@ void CheckSameSweep(const ShardFolder& first, const ShardFolder& candidate) {
       first.input_texts, (first.folder / kInputsFile).string(), candidate.input_texts);
   if (difference.empty()) return;
   FailData(candidate.folder,
-           "belongs to another sweep than " + first.folder.string() + ": " + difference,
+           "the shard belongs to another sweep than " + first.folder.string() + ": " + difference,
            "the shards of one sweep");
 }
 
@@ -113,8 +115,7 @@ void SortByIndex(std::vector<ShardFolder>& shards) {
   for (const ShardFolder& folder : shards) {
     const Shard& shard = folder.shard;
     if (shard.index == index) {
-      FailData(folder.folder, "is shard " + TextOf(shard) + ", which is given twice",
-               "each shard once");
+      FailData(folder.folder, "shard " + TextOf(shard) + " is given twice", "each shard once");
     }
     while (++index < shard.index) missing.push_back(TextOf(Shard{index, shard.count}));
   }
@@ -139,7 +140,8 @@ void AddRuns(const ShardFolder& folder, const SeedRange& seeds,
   const fs::path file = folder.folder / kFinishedRuns;
   std::ifstream stream(file);
   if (!stream)
-    throw Error(ExitCode::kInputMissing, ErrorLine(Place{file.string()}, {}, "cannot be read"));
+    throw Error(ExitCode::kInputMissing,
+                ErrorLine(Place{file.string()}, {}, "the file cannot be read"));
   Place place{file.string(), 0, 0};
   const auto fail = [&place](const std::string& message) {
     throw Error(ExitCode::kBadData, ErrorLine(place, {}, message));
@@ -152,16 +154,15 @@ void AddRuns(const ShardFolder& folder, const SeedRange& seeds,
       std::optional<ParsedRunLine> parsed;
       if (std::getline(stream, line)) parsed = ReadRunLine(line);
       if (!parsed || parsed->value != values[v] || parsed->run.seed != seed)
-        fail("is not the run of seed " + std::to_string(seed));
+        fail("the line is not the run of seed " + std::to_string(seed));
       parsed->run.ShareNames(pool);
       results[v].done.push_back(std::move(parsed->run));
     }
   }
-  if (std::getline(stream, line)) fail("is a line after the last run");
+  if (std::getline(stream, line)) fail("the file contains a line after the last run");
 }
 
-/// Returns a SweepResult without runs for each value. `summary` is the
-/// sweep.json of any shard.
+/// Returns a SweepResult without runs for each value. `summary` is the sweep.json of any shard.
 std::vector<SweepResult> EmptyResults(const Json& summary, std::int64_t runs,
                                       std::uint64_t first_seed) {
   std::vector<SweepResult> results;
@@ -194,7 +195,7 @@ std::vector<SweepResult> ReadResults(const std::vector<ShardFolder>& shards,
   } catch (const Json::exception&) {
   }
   if (results.size() != values.size())
-    FailData(file, "is not the sweep.json of a sweep of this version");
+    FailData(file, "this is not a sweep.json of this alidade version");
   SharedNames pool;
   for (const ShardFolder& folder : shards) {
     AddRuns(folder, SeedsOf(folder.shard, first_seed, runs), values, pool, results);

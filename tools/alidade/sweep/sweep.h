@@ -29,7 +29,7 @@ struct Shard {
 };
 
 struct SweepOptions {
-  std::int64_t runs = 1;         ///< number of runs of all shards together
+  std::int64_t runs = 1;         ///< total number of runs of all shards
   std::uint64_t first_seed = 1;  ///< seed of the first run; each further run has the next seed
   /// Number of threads. 0: one thread for each processor that the process may use. Only one thread
   /// is used if any loaded model lacks ALIDADE_THREAD_INSTANCES (several instances at once).
@@ -38,8 +38,8 @@ struct SweepOptions {
   /// Function that executes a run. Several threads call it at once. If it is empty, alidade::Run()
   /// is called.
   std::function<RunResult(Experiment&, const RunOptions&)> run;
-  std::function<void(std::int64_t, std::int64_t)>
-      progress;                ///< receives the numbers of finished and of all runs
+  /// Receives the number of finished runs and the number of all runs.
+  std::function<void(std::int64_t, std::int64_t)> progress;
   std::function<bool()> stop;  ///< if it returns true, unfinished runs are discarded
   /// Record of finished runs, from SweepFolder::finished(). Recorded runs are not repeated, and new
   /// runs are added. If it is null, every run is executed.
@@ -83,8 +83,8 @@ struct SweepRun {
   ExitCode code = ExitCode::kOk;
   std::string reason;
   std::vector<SweepRow> estimators;
-  std::vector<FrameErrors> reprojection = {};  ///< for the first 500 frames; only in a varied sweep
-  bool withheld = false;  ///< true: no comparison with the reference, see RunResult
+  std::vector<FrameErrors> reprojection = {};  ///< first 500 frames; only in a varied sweep
+  bool withheld = false;  ///< true: the comparison with the reference is withheld, see RunResult
 
   /// Replaces the lists of names of all estimators by equal lists in the pool.
   void ShareNames(SharedNames& pool) {
@@ -117,10 +117,10 @@ struct SweepResult {
 /// cannot be written.
 SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptions& options);
 
-/// Varied keys of the config, and the values to which they are set. In a run, all keys have the
-/// same value.
+/// Varied keys of the config, and the values of these keys. In a run, all varied keys have the same
+/// value.
 struct Variation {
-  std::string key;                  ///< dotted, as for Config::Set(); several keys: `KEY+KEY`
+  std::string key;                  ///< dotted key, as for Config::Set(), or `KEY+KEY`
   std::vector<std::string> values;  ///< values, each in YAML
 
   /// Parses `KEY=v1,v2,v3` or `KEY+KEY=v1,v2,v3`. A comma inside brackets, braces or quotes belongs
@@ -152,7 +152,7 @@ VariedSweep SweepVariation(const Config& config, const PluginHost& host,
 struct SweepSummary {
   std::string name;
   std::int64_t used = 0;          ///< number of runs whose metrics are used
-  std::int64_t diverged = 0;      ///< number of runs in which the estimator diverged; not used
+  std::int64_t diverged = 0;      ///< number of runs in which the estimator diverged
   std::int64_t inconsistent = 0;  ///< number of used runs with inconsistent errors
   std::map<std::string, Spread> metrics;
   std::map<std::string, std::string> units;  ///< units, as in EstimatorResult
@@ -201,8 +201,8 @@ class SweepFolder {
   /// `FOLDER.partial`. `summaries` is the result of Summarise(result). Errors: kCannotCreate, kIo.
   void Write(const SweepResult& result, const std::vector<SweepSummary>& summaries,
              const Config& config);
-  /// Writes the folder of a varied sweep in the same way. Returns the reason if a figure is
-  /// missing, or "". `stop` ends the drawing. Errors: kCannotCreate, kIo.
+  /// Writes the folder of a varied sweep in the same way. If a figure is missing, returns the
+  /// reason, otherwise "". The drawing ends when `stop` returns true. Errors: kCannotCreate, kIo.
   std::string Write(const VariedSweep& sweep, const Config& config,
                     const std::function<bool()>& stop = {});
 

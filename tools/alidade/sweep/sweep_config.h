@@ -14,8 +14,7 @@ void CheckReadableAgain(const Config& config,
                         const char* reader = "a sweep reads the source for every run");
 
 /// Returns true if the data of the source depend on the seed. Reads the data of `seed` and of the
-/// next seed up to the first difference. Also returns true if the data cannot be read without an
-/// error.
+/// next seed up to the first difference. If an error occurs while the data are read, returns true.
 bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed);
 
 /// Throws kBadConfig for a source whose data do not depend on the seed.

@@ -19,7 +19,7 @@ std::string ReferenceText(const SweepResult& result) {
   const std::string text = internal::ReferenceText(run);
   const std::int64_t withheld = CountWithheld(result);
   if (withheld == 0) return text;
-  return text + "; withheld in " + std::to_string(withheld) + " of " +
+  return text + "; the errors are withheld in " + std::to_string(withheld) + " of " +
          std::to_string(CountFinished(result)) +
          " runs, in which the reference failed, diverged or had no estimates";
 }
@@ -86,9 +86,9 @@ std::string NeesLines(const std::vector<SweepSummary>& summaries) {
       if (mean == summary.metrics.end()) continue;
       const double value = mean->second.mean;
       if (value >= bounds.low && value <= bounds.high) continue;
-      lines += summary.name + ": NEES mean " + RoundedText(value, 3) + " of " +
-               key.substr(key.find(':') + 1) + " over " + std::to_string(summary.used) +
-               " runs is outside its 95 % bounds [" + RoundedText(bounds.low, 3) + ", " +
+      lines += summary.name + ": the mean NEES of " + key.substr(key.find(':') + 1) + " over " +
+               std::to_string(summary.used) + " runs is " + RoundedText(value, 3) +
+               ", outside the 95 % bounds [" + RoundedText(bounds.low, 3) + ", " +
                RoundedText(bounds.high, 3) + "]: the filter is " +
                (value > bounds.high ? "overconfident" : "underconfident") + '\n';
     }

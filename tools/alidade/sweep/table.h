@@ -22,13 +22,13 @@ std::int64_t CountWithheld(const SweepResult& result);
 /// time.
 std::map<std::string, Interval> NeesBounds(const SweepSummary& summary);
 
-/// Returns an empty line and a line for each mean NEES outside its bounds. Returns "" if each mean
-/// NEES is inside its bounds.
+/// Returns an empty line, and a line for each mean NEES outside the bounds. Returns "" if each mean
+/// NEES is inside the bounds.
 std::string NeesLines(const std::vector<SweepSummary>& summaries);
 
-/// Returns an empty line and a line with the reference of the errors and the number of runs in
-/// which the reference was withheld. Returns "" if the reference is truth. For a varied sweep,
-/// returns such lines for each value if they differ between values.
+/// Returns an empty line, and a line about the reference of the errors. This line also contains the
+/// number of runs in which the errors were withheld. Returns "" if the reference is truth. For a
+/// varied sweep with different lines, returns the lines of all values.
 std::string ReferenceLines(const SweepResult& result);
 std::string ReferenceLines(const VariedSweep& sweep);
 

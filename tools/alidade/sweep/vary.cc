@@ -56,7 +56,8 @@ std::vector<std::string> SplitValues(const std::string& text) {
 void CheckKey(const Config& config, const std::string& key) {
   const Place place{kOrigin};
   if (key == "source.seed") {
-    internal::FailAt(place, key, "every value is run with the same seeds",
+    internal::FailAt(place, key,
+                     "the seed cannot be varied, because every value uses the same seeds",
                      "another key; --first-seed and --runs set the seeds");
   }
   Node map = config.root();
@@ -71,7 +72,7 @@ void CheckKey(const Config& config, const std::string& key) {
       if (entry == name) next = node;
     }
     if (!next) {
-      internal::FailAt(place, key, "no " + Quoted(key.substr(0, dot)) + " in the config",
+      internal::FailAt(place, key, "the config does not contain " + Quoted(key.substr(0, dot)),
                        "a key of an existing map", Nearest(name, names));
     }
     map = *next;

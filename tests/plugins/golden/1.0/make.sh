@@ -3,8 +3,8 @@
 #
 # 1.0/make.sh FOLDER
 #
-# How the plugins beside it were made, with g++ 12.2 and clang 14.0 of Debian 12, and the headers of
-# plugin ABI 1.0 of their day. To look at, not to run again: see ../README.md.
+# Records how the plugins in this folder were built: with g++ 12.2 and clang 14.0 of Debian 12, and
+# with the first headers of plugin ABI 1.0. Do not run this script again; see ../README.md.
 set -eu
 to=$(cd "$1" && pwd)
 cd "$(dirname "$0")"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The models of models.cc in C99, against plugin_abi.h alone. */
+/* The models of models.cc in C99, written with plugin_abi.h alone. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -47,7 +47,7 @@ static AlidadeParam param(uint32_t kind, const char* key, const char* unit,
   return made;
 }
 
-/* One value; after an error, which the host has noted, 1. */
+/* Returns one value, or 1 after an error, which the host has recorded. */
 static double read_one(const AlidadeHost* host, const AlidadeParam* asked) {
   double value = 1.0;
   return host->read(host->context, asked, &value, 1) == 1 ? value : 1.0;
@@ -305,7 +305,7 @@ typedef struct Direction {
   double field[3], sigma_rad;
 } Direction;
 
-/* B(x), row-major 3 x 2, as plugin_abi.h has it. */
+/* Computes B(x), row-major 3 x 2, as defined in plugin_abi.h. */
 static void basis(const double* x, double* b) {
   const double s = x[2] < 0.0 ? -1.0 : 1.0, a = -1.0 / (s + x[2]);
   b[0] = 1.0 + s * x[0] * x[0] * a;
@@ -329,7 +329,7 @@ static int32_t direction_eval(const void* self, const AlidadeObservation* seen,
   z[1] = m[1] + w * t[1] + u * t[0] - x * t[2];
   z[2] = m[2] + w * t[2] + x * t[1] - y * t[0];
   if (jacobians == NULL || jacobians[0] == NULL) return ALIDADE_OK;
-  /* q (+) d turns z by -d: dz = z x d, in the tangent of z. */
+  /* q (+) d rotates z by -d: dz = z x d, in the tangent space at z. */
   const double cross[9] = {0.0, -z[2], z[1], z[2], 0.0, -z[0], -z[1], z[0], 0.0};
   double b[6];
   basis(z, b);
@@ -391,7 +391,7 @@ typedef struct Cart {
   double speed, turn_rate;
 } Cart;
 
-/* sin(a) / a and its derivative. */
+/* Computes sin(a) / a and its derivative. */
 static void sinc(double a, double* value, double* slope) {
   if (a * a > 1e-4) {
     *value = sin(a) / a;
@@ -402,7 +402,7 @@ static void sinc(double a, double* value, double* slope) {
   }
 }
 
-/* The derivative of x' by (v, o), 3 x 2. */
+/* Writes the derivative of x' with respect to (v, o), 3 x 2. */
 static void write_by_rates(const double* by, double* m, int32_t stride) {
   if (m == NULL) return;
   for (int row = 0; row < 3; ++row) {

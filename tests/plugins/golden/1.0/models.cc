@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Models as an author writes them, with the headers of plugin ABI 1.0. models.c has the same
-// against the C header alone.
+// The models in the form in which an author writes them, with the headers of plugin ABI 1.0.
+// models.c contains the same models, written with the C header alone.
 #include <cmath>
 
 #include "alidade/model/plugin.h"
@@ -18,7 +18,7 @@ using alidade::UnitQuaternion;
 using alidade::UnitVector;
 using alidade::Vec;
 
-/// Length of a line from an anchor above a rail to a carriage on it.
+/// Length of a line from an anchor above a rail to a carriage on the rail.
 ///
 ///   model      z = s sqrt((x - k)^2 + h^2) + b + n
 ///   noise      R = sigma^2, or (sigma z)^2
@@ -74,7 +74,7 @@ struct Line : alidade::Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-/// Position and heading of a cart, from an antenna on it and a compass.
+/// Position and heading of a cart, measured by an antenna on the cart and a compass.
 ///
 ///   model      z = (p + R(h) a, h - d) + n
 ///   noise      L = [s0 0 0; c s1 0; 0 0 sr] / sqrt(averaged),  c = s1 / 2 if coupled, else 0
@@ -146,7 +146,7 @@ struct Direction : alidade::Sensor<UnitVector, UnitQuaternion> {
   }
 };
 
-/// A cart that drives arcs, its speed and turn rate told by odometry.
+/// A cart that drives arcs. Odometry measures its speed and turn rate.
 ///
 ///   model      p' = p + v dt sinc(a) [cos(h + a), sin(h + a)],  h' = h + o dt,  a = o dt / 2,
 ///              (v, o) = u + w, w held over an interval

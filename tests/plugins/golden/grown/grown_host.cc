@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A host of a later minor version: core/alidade/plugin with the header that grow.sh makes.
-// What a plugin of 1.0 does not say is zero to it, and what it lends besides is not looked at.
-// golden_models_test.cc is part of this program too.
+// A host of a later minor version: core/alidade/plugin compiled with the header that grow.sh
+// derives. Members that a plugin of 1.0 does not supply are zero, and such a plugin ignores the new
+// members of this host. golden_models_test.cc is also a part of this program.
 #include <dlfcn.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@
 namespace alidade {
 namespace {
 
-// The sizes of 1.0.
+// The structs are larger than those of 1.0.
 static_assert(ALIDADE_ABI_MINOR == 3);
 static_assert(sizeof(AlidadeTable) > 80 && sizeof(AlidadeEntry) > 104 && sizeof(AlidadeSpace) > 88);
 static_assert(offsetof(AlidadeHost, taken) == 40 && offsetof(AlidadeObservation, taken) == 56);
@@ -52,7 +52,7 @@ TEST_P(GrownHost, MayLendWhatAPluginOf10DoesNotKnow) {
   ASSERT_EQ(c.sensor->eval(c.self, &seen, roles, &z, nullptr, nullptr), ALIDADE_OK);
   EXPECT_NEAR(z, 2.0 * 5.0 + 0.25, 1e-12);
 
-  // A host with one more call.
+  // Calls the plugin with a host that has one additional function.
   void* const library = dlopen(Lent().c_str(), RTLD_NOW | RTLD_LOCAL);
   ASSERT_NE(library, nullptr) << dlerror();
   void* const function = dlsym(library, ALIDADE_ENTRY_SYMBOL);
@@ -74,7 +74,7 @@ TEST_P(GrownHost, MayLendWhatAPluginOf10DoesNotKnow) {
     return std::int32_t{-1};
   };
   lent.fail = [](void*, const char*, const char* text) { ADD_FAILURE() << text; };
-  lent.taken = [] { ADD_FAILURE() << "a plugin of 1.0 does not know it"; };
+  lent.taken = [] { ADD_FAILURE() << "a plugin of 1.0 must not call this function"; };
   AlidadeInstance instance{};
   instance.struct_size = sizeof(instance);
   ASSERT_EQ(entry.create(&lent, &instance), ALIDADE_OK);

@@ -146,7 +146,7 @@ class CsvSource : public Source {
       layout_.blind_after_node->Fail(
           "this key counts rows in the order of the file, but 'out_of_sequence.policy' reorders "
           "them",
-          "'out_of_sequence.policy: reject', which requires a file in the order of time");
+          "'out_of_sequence.policy: reject', which requires a file in chronological order");
     }
     if (!reader_.is_regular()) {
       layout_.blind_after_node->Fail(

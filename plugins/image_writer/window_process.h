@@ -28,7 +28,8 @@ namespace alidade {
 /// socket.
 class WindowProcess {
  public:
-  /// Opens the window. Error: kCannotCreate, with `shown` in the message.
+  /// Opens the window. `shown` is the title as it appears in messages. Error: kCannotCreate, with
+  /// `shown` in the message.
   WindowProcess(const std::string& title, const std::string& shown) {
     std::array<int, 2> sockets{};
     if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, sockets.data()) == 0) {

@@ -61,8 +61,7 @@ estimators: {ekf: {type: ekf}}
   const Outcome created = run("sensors.bad.model", "throws_in_create");
   EXPECT_EQ(created.code, 69) << created.err;
   EXPECT_TRUE(Contains(created.err, "model 'throws_in_create' of plugin " + plugin +
-                                        " could not be created: it threw an exception: the "
-                                        "dog ate it"))
+                                        " could not be created: it threw: the dog ate it"))
       << created.err;
   const Outcome destroyed = run("sensors.bad.model", "throws_in_destroy_too");
   EXPECT_EQ(destroyed.code, 0) << destroyed.err;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Replaces libFuzzer: PROGRAM SEED... or PROGRAM FOLDER MUTATIONS
+// Replacement for libFuzzer. Usage: PROGRAM SEED... or PROGRAM FOLDER MUTATIONS
 //
 // Runs each seed once. With FOLDER, the seeds are the files of this folder, and the program also
-// runs MUTATIONS mutations of them. The mutations are the same in every run. An input that ends the
-// program is written to crash-PROCESS in the working folder. Exit code 2: a seed or the folder
+// runs MUTATIONS mutations of them. The mutations are the same in every run. An input that crashes
+// the program is written to crash-PID in the working folder. Exit code 2: a seed or the folder
 // cannot be read.
 #include <fcntl.h>
 #include <signal.h>

@@ -27,7 +27,7 @@ inline void Require(bool holds, const char* what) {
 }
 
 /// Returns true if `work` ends without an Error, and false if `work` throws an Error. Any other
-/// exception, and an Error that is marked as internal, ends the program.
+/// exception, and an Error that is marked as internal, crashes the program.
 template <class Work>
 bool Accepts(const Work& work) {
   try {

@@ -260,8 +260,8 @@ TEST_F(ImageTracks, RefuseWhatIsNoImage) {
   cv::imwrite(ImageFile(7), cv::Mat(120, 160, CV_8UC1, cv::Scalar(9)));
   const Outcome small = Track();
   EXPECT_EQ(small.code, 65) << small.err;
-  EXPECT_TRUE(Contains(small.err,
-                       "000007.png: the image has 160x120 px, but the first image has 320x240 px"))
+  EXPECT_TRUE(
+      Contains(small.err, "000007.png: the image is 160x120 px, but the first image is 320x240 px"))
       << small.err;
 }
 
@@ -274,7 +274,7 @@ TEST_F(ImageTracks, AreOfImagesAsLargeAsTheCamera) {
   const Outcome other = Track();
   EXPECT_EQ(other.code, 65) << other.err;
   EXPECT_TRUE(Contains(other.err,
-                       "000002.png: the image has 320x240 px, but the camera of config.yaml:2 has "
+                       "000002.png: the image is 320x240 px, but the camera of config.yaml:2 has "
                        "640x480 px"))
       << other.err;
   EXPECT_EQ(Track({"--set", "camera.width=320", "--set", "camera.height=240"}).code, 0);
@@ -289,7 +289,7 @@ TEST_F(ImageTracks, AreOfImagesAsLargeAsTheCamera) {
                             "sensors.pixels.camera={model: pinhole, width: 319, height: 240, fx: "
                             "260, fy: 260, cx: 160, cy: 120}"});
   EXPECT_EQ(own.code, 65) << own.err;
-  EXPECT_TRUE(Contains(own.err, "000000.png: the image has 320x240 px, but the camera of"))
+  EXPECT_TRUE(Contains(own.err, "000000.png: the image is 320x240 px, but the camera of"))
       << own.err;
   Write("config.yaml", kFollow);
   Write("scene/images/calibration.yaml",
@@ -326,7 +326,7 @@ TEST_F(ImageTracks, AreNotOfImagesSmallerThanTheirPatch) {
   const Outcome refused = Track({of_small[0], of_small[1], "--set", "source.window_px=101"});
   EXPECT_EQ(refused.code, 65) << refused.err;
   EXPECT_TRUE(Contains(
-      refused.err, "s.png: the image has 102x102 px, but a tracked patch of 101 px with its rim"))
+      refused.err, "s.png: the image is 102x102 px, but a tracked patch of 101 px with its rim"))
       << refused.err;
   EXPECT_TRUE(Contains(refused.err, "at least 103 px")) << refused.err;
 }

@@ -421,7 +421,7 @@ TEST_F(StereoTarget, BadInputIsNamed) {
   expect({"--set", "source.start_frame=21"}, 78,
          "source.start_frame: image 21 does not exist; the source has 21 images");
   expect({"--set", "camera={width: 320, height: 180}"}, 65,
-         "000000.png: the image has 240x180 px, but the camera of --set");
+         "000000.png: the image is 240x180 px, but the camera of --set");
   Write("times.csv", "0,0\n1,1\n2,2\n4,4\n");
   expect({"--set", "source.timestamps=times.csv"}, 65, "times.csv:4: there is no time for image 3");
   Write("boxes.csv", "frame,x,y,width,height\n0,75,45,2,90\n");
@@ -448,7 +448,7 @@ TEST_F(StereoTarget, BadInputIsNamed) {
   std::filesystem::remove(Image("left", 20));
   cv::Mat small(90, 120, CV_8U, cv::Scalar(9));
   ASSERT_TRUE(cv::imwrite(Image("right", 10), small));
-  expect({"--set", "source.rate_hz=20"}, 65, "000010.png: the image has 120x90 px");
+  expect({"--set", "source.rate_hz=20"}, 65, "000010.png: the image is 120x90 px");
 }
 
 TEST_F(StereoTarget, Example28IsBetterThanItsSimulatedNoise) {

@@ -109,7 +109,7 @@ static_assert(
 inline const OutcomeInfo& InfoOf(Outcome outcome) {
   return kOutcomes[static_cast<std::size_t>(outcome)];
 }
-/// Returns the name of an outcome in files, such as `accepted`.
+/// Returns the name that files use for an outcome, such as `accepted`.
 inline const char* ToString(Outcome outcome) { return InfoOf(outcome).name; }
 /// Converts the status of a model to the outcome of the measurement. kOk becomes kAccepted.
 inline Outcome OutcomeOf(Status status) {

@@ -165,7 +165,7 @@ static_assert(
 inline const EventKindInfo& InfoOf(EventKind kind) {
   return kEventKinds[static_cast<std::size_t>(kind)];
 }
-/// Returns the name of a kind in files, such as `diverged`.
+/// Returns the name that files use for a kind, such as `diverged`.
 inline const char* ToString(EventKind kind) { return InfoOf(kind).name; }
 /// Returns the name of a severity: `info`, `warning`, `error`.
 inline const char* ToString(EventSeverity severity) {

@@ -19,7 +19,8 @@ namespace {
 [[noreturn]] void ThrowUnknownName(const char* kind, std::string_view name,
                                    const std::vector<std::string>& names) {
   throw Error(ExitCode::kBadConfig, "the problem has no " + std::string(kind) + " '" +
-                                        std::string(name) + "'; expected " + internal::Join(names));
+                                        std::string(name) + "'; expected one of " +
+                                        internal::Join(names));
 }
 
 void CheckKnown(const std::string& place, int size, const std::vector<double>& known) {

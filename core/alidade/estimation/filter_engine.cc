@@ -260,7 +260,8 @@ std::optional<Prediction> FilterEngine::Expect(int sensor, std::int64_t landmark
   method->BeginUpdate(f, m);
   pending.linearised.column = 0;
   const Outcome outcome = gate_.Test(f, pending, method->ComputeNis(f, pending));
-  // The outcome may be kGated, because h at the estimate may differ much from the mean of h (Ukf).
+  // In the Ukf the outcome can be kGated: z is h at the estimate, which can be far from the mean of
+  // h over the sigma points.
   if (outcome != Outcome::kAccepted && outcome != Outcome::kGated) return std::nullopt;
   return Prediction{{pending.report->h.begin(), pending.report->h.end()},
                     Eigen::Map<const RowMajor>(pending.s, m, m)};

@@ -36,7 +36,8 @@ struct Health {
 struct FilterState {
   FilterState(std::shared_ptr<const ProblemIndex> index, bool uses_first_estimates);
 
-  int size() const { return state.covariance().size(); }  ///< n
+  /// n: number of rows of P, including gaps
+  int size() const { return state.covariance().size(); }
   /// Updates the members that depend on the set of blocks with a value. Must be called after a
   /// block was initialised or reset.
   void Activate();

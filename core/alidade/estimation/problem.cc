@@ -155,8 +155,8 @@ BlockId StateHandle::operator[](std::string_view block) const {
   if (found != blocks.end()) return found->second;
   std::vector<std::string> names;
   for (const auto& entry : blocks) names.push_back(entry.first);
-  Fail("state '" + name + "'",
-       "the state has no block '" + std::string(block) + "'; expected " + internal::Join(names));
+  Fail("state '" + name + "'", "the state has no block '" + std::string(block) +
+                                   "'; expected one of " + internal::Join(names));
 }
 
 StateHandle Problem::AddState(const std::string& name, SharedMotion model,
@@ -172,7 +172,7 @@ StateHandle Problem::AddState(const std::string& name, SharedMotion model,
       Fail(place, "block '" + value.block + "' has several initial values; expected one");
     }
     if (std::ranges::count(spaces, value.block, &Space::name) == 0) {
-      Fail(place, "the model has no block '" + value.block + "'; expected " +
+      Fail(place, "the model has no block '" + value.block + "'; expected one of " +
                       internal::Join(NamesOf(spaces)));
     }
   }

@@ -32,7 +32,8 @@ struct SensorPlace {
   int ambient = 0, dof = 0;  ///< ambient and tangent size of the measurement
   int known_size = 0;        ///< number of known numbers of a measurement
 
-  /// Sets the offsets of the roles from `first` on to the offsets of the blocks of a landmark.
+  /// Sets the offsets of role `first` and all later roles to the offsets of the blocks of a
+  /// landmark.
   void PutLandmark(std::size_t first, const StateLayout& layout,
                    const std::vector<BlockId>& blocks);
 };

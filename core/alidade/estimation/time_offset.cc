@@ -42,7 +42,7 @@ class OffsetSensor final : public SensorModel {
   }
 
  private:
-  /// Temporary memory of a call. Later calls in the same thread reuse the memory.
+  /// Scratch memory of one call. Later calls in the same thread reuse the memory.
   struct Memory {
     std::vector<double> next, f, g, rate;  ///< x(t + delta), F, G, df/ddelta of all movers
     std::vector<double> shifted, jacobian;

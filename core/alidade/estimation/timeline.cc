@@ -73,8 +73,8 @@ StepError Timeline::NextSubStep(Timestamp start, Timestamp end, std::vector<Even
   if (overflow || sub_step.steps > kMaxSteps) {
     return {EventKind::kTooManySubsteps,
             "a gap of " + RoundedText(Seconds(sub_step.end) - Seconds(start)) +
-                " s would need more than " + RoundedText(static_cast<double>(kMaxSteps)) +
-                " steps of " + RoundedText(max_dt_s_) + " s; increase max_dt_s"};
+                " s needs more than " + RoundedText(static_cast<double>(kMaxSteps)) + " steps of " +
+                RoundedText(max_dt_s_) + " s; increase max_dt_s"};
   }
   sub_step.dt_s = Seconds(elapsed);
   if (sub_step.steps > 1) sub_step.dt_s /= static_cast<double>(sub_step.steps);

@@ -46,7 +46,7 @@ class Timeline {
   Timestamp StartFor(const Frame& first) const { return start_.value_or(first.timestamp); }
   /// Computes the sub-step from `start` towards `end`, which must be later. The event `substeps`
   /// reports a sub-step that has at least twice as many steps as every sub-step reported before.
-  /// Returns an error if the sub-step would need too many steps.
+  /// Returns an error if the sub-step needs too many steps.
   StepError NextSubStep(Timestamp start, Timestamp end, std::vector<Event>& events,
                         SubStep& sub_step);
 

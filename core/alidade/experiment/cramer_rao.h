@@ -46,7 +46,7 @@ class CramerRaoBound {
   CramerRaoBound(const Problem& problem, const std::vector<StreamInfo>& streams,
                  const std::vector<StreamInfo>& truths, TrueLandmark true_landmark = {});
 
-  /// Processes the next frame of a run, in the order of time. Returns false if the bound does not
+  /// Processes the next frame of a run, in chronological order. Returns false if the bound does not
   /// exist for this frame, because the truth of an estimated block or landmark is unknown, a step
   /// failed, or a landmark could not start at truth. All later calls then also return false.
   bool Add(const SourceFrame& frame);

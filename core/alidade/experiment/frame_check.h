@@ -27,7 +27,7 @@ class FrameCheck {
   /// if the length of a quaternion or direction differs from 1 by more than 1e-3.
   void operator()(SourceFrame& frame);
   /// Replaces each true quaternion q by -q if -q is nearer to the previous true quaternion. Frames
-  /// must be passed in the order of time.
+  /// must be passed in chronological order.
   void ChooseTruthSigns(SourceFrame& frame);
 
  private:

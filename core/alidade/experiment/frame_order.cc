@@ -91,7 +91,7 @@ bool FrameOrder::Accept(const Frame& frame) {
   ++arrivals_.dropped;
   events_.push_back({frame.timestamp, EventKind::kOutOfSequence,
                      "a frame " + StreamNames(frame) + "was dropped: it is " + SecondsText(lag) +
-                         " older than the newest frame, but the window is " +
+                         " older than the newest frame, but the window is only " +
                          SecondsText(*experiment_.out_of_sequence.window)});
   return false;
 }

@@ -31,7 +31,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Series from which its mean was subtracted. sums[k] is the sum of the first k values, and
+/// Series with its mean subtracted. sums[k] is the sum of the first k values, and
 /// squares[k] is the sum of their squares.
 struct CentredSeries {
   Eigen::VectorXd values, sums, squares;

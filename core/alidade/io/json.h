@@ -17,8 +17,8 @@ using Json = nlohmann::ordered_json;
 std::string JsonText(const Json& json);
 
 /// Returns `text` as a JSON string. Code that composes its output from such strings needs no Json
-/// list or map. The destructor of a Json list or map allocates memory, and ends the program if
-/// memory runs out.
+/// list or map. The destructor of a Json list or map allocates memory, and crashes the program
+/// if memory runs out.
 std::string JsonString(std::string_view text);
 
 /// Parses `text`, which was read from `file`. Error: kBadData with the line and column.

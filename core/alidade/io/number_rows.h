@@ -77,7 +77,7 @@ class NumberRows {
     std::int64_t value = 0;
     const char* const last = digits.data() + digits.size();
     const auto [end, error] = std::from_chars(digits.data(), last, value);
-    const char* const expected = "a whole number of 0 or more";
+    const char* const expected = "a whole number >= 0";
     if (end != last || error == std::errc::invalid_argument) {
       FailCell(i, name, "is not a whole number", expected);
     }

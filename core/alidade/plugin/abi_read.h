@@ -87,7 +87,7 @@ std::string CatchExceptionText(const Call& call) {
     return {};
   } catch (const std::exception& e) {
     const std::string text = PrintableText(e.what());
-    return text.empty() ? "an exception without a text" : text;
+    return text.empty() ? "an exception without a message" : text;
   } catch (...) {
     return "an exception of unknown type";
   }

@@ -140,7 +140,7 @@ std::shared_ptr<const ModelInstance> CreateModel(const PluginEntry& entry, const
   }
   reader.Check();
   if (!instance.exception_text().empty())
-    FailCreation(entry, node, "it threw an exception: " + instance.exception_text());
+    FailCreation(entry, node, "it threw: " + instance.exception_text());
   if (code != ALIDADE_OK) {
     FailCreation(entry, node,
                  reader.failure().empty() ? "it did not report a reason" : reader.failure());

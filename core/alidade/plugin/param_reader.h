@@ -14,7 +14,7 @@
 
 namespace alidade::internal {
 
-/// Returns the host of one creation of a model. The caller sets the host's functions, which receive
+/// Returns a host for creating one model. The caller sets the functions of the host, which receive
 /// `context`.
 AlidadeHost MakeHost(void* context);
 

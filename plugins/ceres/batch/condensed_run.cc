@@ -203,8 +203,8 @@ bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
   internal::Timeline::SubStep sub_step;
   for (; from < to; from = sub_step.end) {
     if (time_.NextSubStep(from, to, events, sub_step) || sub_step.steps > kMostSteps) {
-      return Fail("a gap before " + internal::SecondsText(sub_step.end) + " needs more than " +
-                  std::to_string(kMostSteps) + " steps of max_dt_s");
+      return Fail("the gap that ends at t = " + internal::SecondsText(sub_step.end) +
+                  " needs more than " + std::to_string(kMostSteps) + " steps; increase max_dt_s");
     }
     for (Timestamp part = 0; part < sub_step.steps; ++part) {
       for (std::size_t i = 0; i < binding_.motion_places.size(); ++i) {

@@ -34,7 +34,7 @@ void CameraSize::Check(cv::Size found, const Place& image) const {
     throw Error(
         ExitCode::kBadData,
         ErrorLine(image, {},
-                  "the image has " + SizeText(found) + ", but the camera of " + camera.place +
+                  "the image is " + SizeText(found) + ", but the camera of " + camera.place +
                       " has " + SideText(camera.width) + "x" + SideText(camera.height) + " px",
                   "images of this camera, or a section 'camera' with the width and height "
                   "of these images, and with fx, fy, cx, cy in pixels of these images"));

@@ -46,7 +46,7 @@ bool ImageReader::Next(cv::Mat& image) {
   ++number_;
   if (size_.empty()) size_ = image.size();
   if (image.size() != size_) {
-    Fail("the image has " + SizeText(image.size()) + ", but the first image has " + SizeText(size_),
+    Fail("the image is " + SizeText(image.size()) + ", but the first image is " + SizeText(size_),
          "images of the same size");
   }
   return true;

@@ -23,7 +23,7 @@ struct ExpectedPoint {
   cv::Point2f position;
   cv::Matx22d s;  ///< covariance of the position, px^2
 
-  /// Returns the standard deviation along the longer axis of the ellipse.
+  /// Returns the standard deviation along the major axis of the covariance ellipse.
   double LargestSigma() const {
     const double mean = 0.5 * (s(0, 0) + s(1, 1)), half = 0.5 * (s(0, 0) - s(1, 1));
     return std::sqrt(mean + std::hypot(half, s(0, 1)));

@@ -131,7 +131,7 @@ class ImageTracks : public Source {
     if (std::min(image_.cols, image_.rows) >= min_side) return;
     throw Error(ExitCode::kBadData,
                 ErrorLine(place(), {},
-                          "the image has " + SizeText(image_.size()) + ", but a tracked patch of " +
+                          "the image is " + SizeText(image_.size()) + ", but a tracked patch of " +
                               std::to_string(tracker_.window_px()) + " px with its rim is larger",
                           "at least " + std::to_string(min_side) +
                               " px on each side, or a smaller source.window_px"));

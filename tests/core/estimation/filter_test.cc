@@ -219,12 +219,12 @@ TEST(Live, NamesAreThoseOfTheConfigAndAWrongOneIsAnErrorThatListsThem) {
     return "";
   };
   EXPECT_EQ(text([&] { ekf.stream("disparty"); }),
-            "the problem has no stream 'disparty'; expected disparity, inverse_scale");
+            "the problem has no stream 'disparty'; expected one of disparity, inverse_scale");
   EXPECT_EQ(text([&] { ekf.block("depth"); }),
-            "the problem has no block 'depth'; expected target.depth, target.depth_rate, "
+            "the problem has no block 'depth'; expected one of target.depth, target.depth_rate, "
             "template.inverse_distance");
   EXPECT_EQ(text([&] { ekf.Expect("stereo", 0); }),
-            "the problem has no sensor 'stereo'; expected disparity, inverse_scale");
+            "the problem has no sensor 'stereo'; expected one of disparity, inverse_scale");
 }
 
 TEST(Live, AReadingThatNoSensorTakesIsAnErrorAndChangesNothing) {

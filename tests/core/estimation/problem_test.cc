@@ -156,7 +156,7 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Point(1.0), {{"depth", 0.0, 1.0}, {"velocity", 0.0, 1.0}});
             }),
-            "state 'b': the model has no block 'depth'; expected position, velocity");
+            "state 'b': the model has no block 'depth'; expected one of position, velocity");
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Constant<3>(3), {{"value", {0.0, 1.0}, 1.0}});
             }),
@@ -189,7 +189,7 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
             "sensor 's': role 0 in the option `owned` is not a model parameter state; expected a "
             "role with the flag ALIDADE_ROLE_OWNED and without a block");
   EXPECT_EQ(Refusal([](Problem&, auto& target) { static_cast<void>(target["depth"]); }),
-            "state 'target': the state has no block 'depth'; expected position, velocity");
+            "state 'target': the state has no block 'depth'; expected one of position, velocity");
   EXPECT_EQ(Refusal([&](Problem& p, auto&) { p.AddSensor("s", stereo, {}); }),
             "sensor 's': role 'depth' has no block; expected a block that is a vector(1)");
   EXPECT_EQ(Refusal([&](Problem& p, auto& t) {

@@ -75,7 +75,7 @@ TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
     EXPECT_EQ(event->timestamp, beyond.timestamp);
     EXPECT_EQ(event->text,
               "a frame of disparity, inverse_scale was dropped: it is 0.100000 s older than the "
-              "newest frame, but the window is 0.100000 s");
+              "newest frame, but the window is only 0.100000 s");
   }
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
 }

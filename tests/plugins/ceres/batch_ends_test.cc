@@ -67,7 +67,7 @@ TEST(CeresBatchEnds, TimesReadTheSameInEveryLocale) {
   const UpdateReport& report = batch->Process(FrameAt(1010.5, {}));
   ASSERT_FALSE(report.events.empty());
   EXPECT_EQ(report.events[0].text,
-            "a gap before 1010.500000 s needs more than 4000 steps of max_dt_s");
+            "the gap that ends at t = 1010.500000 s needs more than 4000 steps; increase max_dt_s");
 }
 
 // ---- a model that fails -------------------------------------------------------------------------

@@ -284,13 +284,13 @@ TEST_F(Csv, BlindNamesTheStreams) {
                   "the key 'blind_after', too");
 }
 
-TEST_F(Csv, BlindAfterNeedsRowsInTheOrderOfTime) {
+TEST_F(Csv, BlindAfterNeedsRowsInChronologicalOrder) {
   Write(std::string(kHeader) + "1,1,2,3\n0,1,2,3\n");
   any_order_ = true;
   ExpectBadConfig(kDepthConfig + std::string("blind_after: 0.5\n"),
                   "run.yaml:4:14 blind_after: this key counts rows in the order of the file, but "
                   "'out_of_sequence.policy' reorders them; expected 'out_of_sequence.policy: "
-                  "reject', which requires a file in the order of time");
+                  "reject', which requires a file in chronological order");
   EXPECT_EQ(Frames(kDepthConfig + std::string("blind_after: 1\n")).size(), 2u);
 }
 

@@ -124,7 +124,7 @@ TEST_F(HostTest, EveryShippedPluginListsItsNames) {
   }
 }
 
-// ---- 50: missing --------------------------------------------------------------------------------
+// ---- fault 50 of tests/faults/README.md: missing ------------------------------------------------
 
 TEST_F(HostTest, AMissingModelNamesPlaceSuggestionAndSearch) {
   const PluginHost host({Built("good")});
@@ -156,7 +156,7 @@ TEST_F(HostTest, AGivenPlaceThatIsNotThereIsAnError) {
   ExpectRefused("/nowhere/x.so", {"no such file or folder"});
 }
 
-// ---- 51: not a plugin ---------------------------------------------------------------------------
+// ---- fault 51 of tests/faults/README.md: not a plugin -------------------------------------------
 
 TEST_F(HostTest, AFileThatIsNotAPluginIsRefused) {
   const fs::path text = folder_ / "text.so", empty = folder_ / "empty.so", pipe = folder_ / "p.so";
@@ -189,7 +189,7 @@ TEST_F(HostTest, APluginForAnotherKindOfProcessorIsRefused) {
   ExpectRefused(file, {"has no alidade build tag", "is for another kind of processor"});
 }
 
-// ---- 52 to 55: build tag and load ---------------------------------------------------------------
+// ---- faults 52 to 55 of tests/faults/README.md: build tag and loading ---------------------------
 
 TEST_F(HostTest, AFileWithoutBuildTagIsRefused) {
   ExpectRefused(Built("no_build_tag"), {"has no alidade build tag"});
@@ -262,7 +262,7 @@ TEST_F(HostTest, AFlagThatNeedNotBeUnderstoodIsIgnored) {
   EXPECT_EQ(std::ranges::count(host.entries(), "other_probe", &PluginEntry::name), 1);
 }
 
-// ---- 56, 57: two files, one name; one file, two names -------------------------------------------
+// ---- faults 56, 57 of tests/faults/README.md: two files, one name; one file, two names ----------
 
 TEST_F(HostTest, TwoPluginsWithOneNameAreAnErrorOnceItIsAskedFor) {
   const fs::path a = Copy("good", "a.so"), b = Copy("good", "b.so");
@@ -281,7 +281,7 @@ TEST_F(HostTest, OneFileUnderManyNamesIsLoadedOnce) {
   EXPECT_EQ(std::count_if(host.entries().begin(), host.entries().end(), has_name), 1);
 }
 
-// ---- 58, 59: failures while creating ------------------------------------------------------------
+// ---- fault 58 of tests/faults/README.md: failures while creating --------------------------------
 
 TEST_F(HostTest, AnExceptionInCreateNamesModelAndPlugin) {
   const PluginHost host({Built("bad_create")});

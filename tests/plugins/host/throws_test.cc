@@ -33,7 +33,7 @@ TEST_F(ThrowsTest, InCreateIsAnErrorOfThePlugin) {
   const std::string plugin = Built("raw_throws").string();
   ExpectError(ExitCode::kPlugin,
               {"model 'throws_in_create' of plugin " + plugin,
-               "could not be created: it threw an exception: the dog ate it"},
+               "could not be created: it threw: the dog ate it"},
               [&] { Sensor("throws_in_create"); });
   ExpectError(ExitCode::kPlugin, {"model 'throws_int_in_create'", "an exception of unknown type"},
               [&] { Sensor("throws_int_in_create"); });

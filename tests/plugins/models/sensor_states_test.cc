@@ -210,8 +210,8 @@ const std::string kPose =
     "  ekf: {type: ekf}\n  iekf: {type: iekf}\n  root: {type: square_root_ekf}\n"
     "  ukf: {type: ukf}\n  rts: {type: rts}\n";
 
-// The body has twelve degrees of freedom. The standard deviation of the mean over 30 runs is at
-// most 0.08.
+// The body has twelve degrees of freedom, so the mean NEES over 30 runs has a standard deviation of
+// at most 0.08.
 TEST(SensorStates, AFilterOfPosesIsConsistent) {
   for (const auto& [name, nees] : MeansOf(kPose, "nees.mean:body", 30)) {
     EXPECT_NEAR(nees, 1.0, 0.2) << name;

@@ -28,10 +28,10 @@ TEST_F(TracksTest, Fault28NotANumber) {
   }
   ExpectBadData("0,3.5,0,1\n",
                 "DIR/tracks.csv:1:3 feature: '3.5' is not a whole number; expected a "
-                "whole number of 0 or more");
+                "whole number >= 0");
   ExpectBadData(kGood + "x,3,0,1\n",
                 "DIR/tracks.csv:3:1 frame: 'x' is not a whole number; expected "
-                "a whole number of 0 or more");
+                "a whole number >= 0");
 }
 
 TEST_F(TracksTest, Fault29NotFinite) {
@@ -59,7 +59,7 @@ TEST_F(TracksTest, Fault30AFrameBeyondAllTimes) {
 TEST_F(TracksTest, Fault31NegativeFrame) {
   ExpectBadData("-1,3,0,1\n",
                 "DIR/tracks.csv:1:1 frame: '-1' is negative; expected a whole number "
-                "of 0 or more");
+                ">= 0");
 }
 
 TEST_F(TracksTest, Fault32UnknownDim) {

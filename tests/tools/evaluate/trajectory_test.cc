@@ -155,7 +155,7 @@ TEST_F(TrajectoryFiles, RowsThatAreNoneAreRefusedWithTheirPlace) {
             "poses.txt:2: the length of the quaternion is 1.010000; expected a length within "
             "1e-3 of 1");
   EXPECT_EQ(Refusal("1.5,1,2,3,1,0,0,0\n"),
-            "poses.txt:1:1 t: '1.5' is not a whole number; expected a whole number of 0 or more");
+            "poses.txt:1:1 t: '1.5' is not a whole number; expected a whole number >= 0");
   const std::string no_rotation =
       "poses.txt:1: columns 1-3, 5-7, 9-11 are not a rotation matrix; expected R with R R' = 1 to "
       "within 1e-3, and det R = 1";

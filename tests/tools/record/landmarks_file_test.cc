@@ -195,8 +195,8 @@ TEST(LandmarkRecords, PointsOfTheMapAreWrittenAsPly) {
             "1.5 -2 2 0.5 1 2 0 7\n");
 }
 
-// If a landmark was seen along one ray only, its distance is unknown. The inverse distance is then
-// written in separate cells.
+// If a landmark was seen along one ray only, its position is undetermined. The cells of the
+// position are then empty, and only the inverse distance and its sigma are written.
 TEST(LandmarkRecords, AnInverseDistanceIsWrittenBeforeItsSigma) {
   LandmarkEstimate far_off;
   far_off.id = 7;

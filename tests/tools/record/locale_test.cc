@@ -67,7 +67,7 @@ std::string ReasonOfAFailure() {
 
 TEST(CommaLocale, ChangesNoMessage) {
   const std::string plain = ReasonOfAFailure();
-  EXPECT_NE(plain.find(" s would need more than 1e+06 steps of 1.5e-09 s; increase max_dt_s; last "
+  EXPECT_NE(plain.find(" s needs more than 1e+06 steps of 1.5e-09 s; increase max_dt_s; last "
                        "good state at 0.000000 s: target.depth = 0."),
             std::string::npos)
       << plain;

@@ -69,8 +69,8 @@ std::string PriorText(const Prior& prior, const Block& block) {
   return text + " +- " + SigmasText(prior.covariance);
 }
 
-/// Returns a table of the blocks. Below the table, the text explains `constant`, and states why a
-/// truth is not used.
+/// Returns a table of the blocks. Below the table, a line explains the status `constant` if a block
+/// has it, and one line for each unused truth states the reason.
 std::string StateTable(const Problem& problem, const std::vector<StreamInfo>& truths) {
   const std::vector<int> block_truths = internal::MatchTruths(problem.layout, truths);
   std::vector<TextRow> rows = {

@@ -31,8 +31,8 @@ std::optional<PredictedCpuTime> PredictCpuTime(Experiment& experiment) {
     times.push_back(std::make_shared<CpuTime>());
     spec.estimator = WithCpuClock(std::move(spec.estimator), times.back());
   }
-  // The stop is requested only once. The first request ends the frames; a second request would end
-  // the smoothing.
+  // Requests a stop only once. The first request ends the processing of frames; a second request
+  // would also end the smoothing.
   bool stop_requested = false;
   RunOptions options;
   options.progress = [&](std::int64_t frames, std::int64_t) { prediction.frames = frames; };

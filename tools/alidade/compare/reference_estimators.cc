@@ -248,7 +248,7 @@ std::map<std::string, std::string> FindBeyondBudget(ComparedExperiment& compared
                      ", but the budget is " + seconds(budget_s);
     }
   }
-  note = "the predicted CPU time is " + seconds(sum_s) + ", from the first " +
+  note = "the predicted total CPU time is " + seconds(sum_s) + "; the prediction uses the first " +
          std::to_string(prediction->frames) + " of " + std::to_string(prediction->total_frames) +
          " frames";
   return beyond;

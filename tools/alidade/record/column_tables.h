@@ -60,7 +60,8 @@ inline constexpr std::array kMeasurementColumns =
          [](const MeasurementLayout& layout) { return NumberedColumns("v", layout.width); },
          "`v0`, `v1`, ..."},
         {"known", "unit of the stream",
-         "known numbers of the measurement; the columns exist if a stream has known numbers",
+         "numbers that accompany the measurement and are not estimated, such as the position of a "
+         "satellite; the columns exist only if a stream has such numbers",
          [](const MeasurementLayout& layout, const MeasurementRow& row, CsvFile& file) {
            file.Numbers(row.measurement.known.data(), row.measurement.known.size(),
                         layout.known_width);

@@ -11,6 +11,9 @@ namespace alidade::testing {
 SharedSensor LinearSensor(double gain, double sigma) {
   return MakeSensor(Linear(gain, sigma), "linear");
 }
+SharedSensor SumSensor(double a, double b, double sigma) {
+  return MakeSensor(WeightedSum(a, b, sigma), "sum");
+}
 SharedMotion ConstantMotion(int size, double random_walk) {
   return MakeMotion(Constant<>(size, random_walk), "constant");
 }

@@ -37,8 +37,26 @@ struct Linear : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
+/// Sensor z = a x + b y + n.
+struct WeightedSum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}, Quantity{"y"}};
+  static constexpr Quantity kMeasurement{"z"};
+  double a, b, sigma;
+  WeightedSum(double first, double second, double s) : a(first), b(second), sigma(s) {}
+  template <class T>
+  bool Predict(const T* x, const T* y, T* z) const {
+    z[0] = a * x[0] + b * y[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(sigma);
+  }
+};
+
 // Models that most tests use, compiled only once in systems.cc.
 SharedSensor LinearSensor(double gain, double sigma);
+SharedSensor SumSensor(double a, double b, double sigma);
 SharedMotion ConstantMotion(int size, double random_walk = 0.0);
 /// Returns a constant-velocity model on one axis, with discrete noise.
 SharedMotion ConstantVelocityMotion(double acceleration);

@@ -15,9 +15,11 @@ inline Trajectory Curve(int poses) {
   Trajectory t;
   t.name = "curve.tum";
   t.first_line = 1;
+  t.row_count = poses;
   t.positions.resize(3, poses);
   for (int i = 0; i < poses; ++i) {
     const double s = 0.1 * i;
+    t.rows.push_back(i);
     t.timestamps.push_back(100'000'000'000 + Timestamp{100'000'000} * i);
     t.positions.col(i) << 3.0 * std::cos(s), 2.0 * std::sin(s) + 0.1 * s, 0.5 * std::sin(2.0 * s);
     t.orientations.emplace_back(Eigen::AngleAxisd(s, Eigen::Vector3d::UnitZ()) *

@@ -6,7 +6,34 @@
 #include <numeric>
 #include <vector>
 
+#include "alidade/base/text.h"
+
 namespace alidade {
+namespace {
+
+/// Returns true if the letters of `part` occur in `whole` in this order.
+bool HasLetters(std::string_view whole, std::string_view part) {
+  std::size_t found = 0;
+  for (const char c : whole) {
+    if (found < part.size() && c == part[found]) ++found;
+  }
+  return found == part.size();
+}
+
+/// Returns true if `part` abbreviates `whole`: its letters occur in `whole` in the same order, from
+/// the start of one of the words that `_` and `.` separate.
+bool Abbreviates(std::string_view part, std::string_view whole) {
+  constexpr std::size_t kMinSize = 3;
+  if (part.size() < kMinSize || part.size() >= whole.size()) return false;
+  for (std::size_t start = 0; start < whole.size(); ++start) {
+    const bool is_word_start = start == 0 || whole[start - 1] == '_' || whole[start - 1] == '.';
+    if (!is_word_start || whole[start] != part[0]) continue;
+    if (HasLetters(whole.substr(start), part)) return true;
+  }
+  return false;
+}
+
+}  // namespace
 
 std::string ToString(const Place& place) {
   std::string text = place.file;
@@ -47,6 +74,14 @@ Failure CaughtFailure() {
   } catch (...) {
     return {ExitCode::kInternal, "internal: an exception of unknown type"};
   }
+}
+
+int SpellingCost(std::string_view word, std::string_view candidate) {
+  constexpr int kAbbreviationCost = 1000;  // above the distance of any typing error
+  const std::string a = internal::LowerCase(word), b = internal::LowerCase(candidate);
+  const int distance = EditDistance(a, b);
+  if (distance < static_cast<int>(a.size()) / 3 + 2) return distance;
+  return Abbreviates(a, b) || Abbreviates(b, a) ? kAbbreviationCost + distance : kNotSimilar;
 }
 
 int EditDistance(std::string_view a, std::string_view b) {

@@ -10,7 +10,7 @@ namespace alidade {
 /// Exit code of the program. The values from 65 to 78 follow sysexits.h.
 enum class ExitCode : int {
   kOk = 0,
-  kFound = 1,          ///< a command such as check or compare found a defect
+  kFound = 1,          ///< a command such as check, compare or run --strict found a defect
   kUsage = 2,          ///< the command line is wrong
   kBadData = 65,       ///< an input file contains an error
   kInputMissing = 66,  ///< an input file cannot be opened
@@ -59,10 +59,17 @@ Failure CaughtFailure();
 std::string ErrorLine(const Place& place, std::string_view key, std::string_view problem,
                       std::string_view expected = {}, std::string_view suggestion = {});
 
-/// Returns the candidate with the smallest edit distance to `word`. Returns "" if no candidate is
-/// similar enough for a suggestion.
+/// Returns the candidate that is most similar to `word` according to SpellingCost(). Returns "" if
+/// no candidate is similar enough for a suggestion.
 template <class Range>
 std::string Nearest(std::string_view word, const Range& candidates);
+
+/// Cost of two texts that are not similar.
+inline constexpr int kNotSimilar = 1 << 20;
+/// Returns the cost of reading `word` as `candidate`, without regard to the case of ASCII letters.
+/// Typing errors cost less than an abbreviation: `sigma` or `sgm` of `sigma_px`, `depth` of
+/// `target.depth`, or the reverse. The cost of any other pair is kNotSimilar.
+int SpellingCost(std::string_view word, std::string_view candidate);
 
 /// Returns the Damerau-Levenshtein distance. Swapping two adjacent letters counts as one edit.
 int EditDistance(std::string_view a, std::string_view b);
@@ -78,11 +85,11 @@ class ContractViolation : public std::logic_error {
 template <class Range>
 std::string Nearest(std::string_view word, const Range& candidates) {
   std::string best;
-  int best_distance = static_cast<int>(word.size()) / 3 + 2;
+  int best_cost = kNotSimilar;
   for (const auto& candidate : candidates) {
-    const int distance = EditDistance(word, candidate);
-    if (distance < best_distance) {
-      best_distance = distance;
+    const int cost = SpellingCost(word, candidate);
+    if (cost < best_cost) {
+      best_cost = cost;
       best = candidate;
     }
   }

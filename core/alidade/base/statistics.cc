@@ -83,18 +83,34 @@ double ChiSquareQuantile(double q, double dof) {
   }
 }
 
+double TruncatedMean(double dof, double cut) {
+  ALIDADE_EXPECTS(dof > 0.0 && cut > 0.0);
+  if (std::isinf(cut)) return 1.0;
+  // The densities satisfy x chi2(x; dof) = dof chi2(x; dof + 2).
+  return ChiSquareTails(cut, dof + 2.0).below / ChiSquareTails(cut, dof).below;
+}
+
 Interval ConsistencyBounds(double dof, double n, double cut) {
   ALIDADE_EXPECTS(dof > 0.0 && n > 0.0 && cut > 0.0);
   double m = 1.0, v = 2.0 / dof;
   if (std::isfinite(cut)) {
-    // The densities satisfy x chi2(x; dof) = dof chi2(x; dof + 2).
-    const auto below = [cut](double k) { return ChiSquareTails(cut, k).below; };
-    const double accepted = below(dof);
-    m = below(dof + 2.0) / accepted;
-    v = (dof + 2.0) / dof * below(dof + 4.0) / accepted - m * m;
+    m = TruncatedMean(dof, cut);
+    v = (dof + 2.0) / dof * m * TruncatedMean(dof + 2.0, cut) - m * m;
   }
   const double nu = 2.0 * n * m * m / v;
   return {m * ChiSquareQuantile(0.025, nu) / nu, m * ChiSquareQuantile(0.975, nu) / nu};
+}
+
+ScaleTest TestScale(double mean, double dof, double n) {
+  constexpr double kProbability = 8e-7, kSmallestFactor = 1.15 * 1.15;
+  const double nu = n * dof;
+  if (mean >= kSmallestFactor && mean > ChiSquareQuantile(1.0 - kProbability, nu) / nu) {
+    return ScaleTest::kTooLarge;
+  }
+  if (mean <= 1.0 / kSmallestFactor && mean < ChiSquareQuantile(kProbability, nu) / nu) {
+    return ScaleTest::kTooSmall;
+  }
+  return ScaleTest::kPassed;
 }
 
 double Quantile(const std::vector<double>& ascending, double q) {

@@ -10,6 +10,10 @@ namespace alidade {
 /// [0, 1].
 double ChiSquareQuantile(double q, double dof);
 
+/// Returns the mean of chi2(dof) / dof, truncated at chi2(dof) <= cut. A gate with the threshold
+/// `cut` accepts only measurements with r' S^-1 r <= cut.
+double TruncatedMean(double dof, double cut);
+
 /// Closed interval.
 struct Interval {
   double low, high;
@@ -26,6 +30,14 @@ struct Interval {
 /// only measurements with r' S^-1 r <= cut (not divided by dof).
 Interval ConsistencyBounds(double dof, double n,
                            double cut = std::numeric_limits<double>::infinity());
+
+/// Result of TestScale.
+enum class ScaleTest { kPassed, kTooLarge, kTooSmall };
+/// Tests whether the mean of n independent values of chi2(dof) / dof, such as NEES / dof, may be 1.
+/// The mean is too large if it exceeds chi2(1 - 8e-7, nu) / nu, nu = n dof, and is at least 1.15^2.
+/// It is too small if it is below chi2(8e-7, nu) / nu and at most 1.15^-2. n need not be an
+/// integer. The probability of a false alarm is 1.6e-6.
+ScaleTest TestScale(double mean, double dof, double n);
 
 /// Returns the q-quantile of the ascending values x[0..n-1], n > 0. q is in [0, 1]. Interpolates
 /// linearly between the values (type 7 of Hyndman and Fan):

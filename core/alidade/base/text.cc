@@ -16,4 +16,12 @@ std::string WithArticle(const std::string& noun) {
   return (has_vowel ? "an " : "a ") + noun;
 }
 
+std::string LowerCase(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return lower;
+}
+
 }  // namespace alidade::internal

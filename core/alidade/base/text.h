@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace alidade::internal {
@@ -11,6 +12,9 @@ std::string Join(const std::vector<std::string>& parts, const char* separator = 
 
 /// Returns the noun with its indefinite article: `a source`, `an estimator`.
 std::string WithArticle(const std::string& noun);
+
+/// Returns `text` with its ASCII letters in lower case, in any locale.
+std::string LowerCase(std::string_view text);
 
 /// Returns the member `name` of each element.
 template <class Range>

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "alidade/base/all_finite.h"
+#include "alidade/estimation/digits_lost.h"
 #include "alidade/estimation/stacked_measurements.h"
 #include "alidade/state/tiles.h"
 
@@ -208,6 +209,9 @@ void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* c
     if (consider_gain) {
       AddOuterProduct(f.state.covariance().lower(), consider_rows_, consider_gain->e);
     }
+  }
+  for (const PendingMeasurement* const pending : rows) {
+    CheckDigits(f, *pending, update.inverse_d() + pending->linearised.column);
   }
   f.state.MoveTo(f.moved);  // must come last, because MoveTo also transports P
   if (recorded) {

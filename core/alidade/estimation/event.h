@@ -16,20 +16,22 @@ enum class EventKind {
   kStopped,
   kPluginFailed,
   kSensorDisabled,
-  kInconsistent,
-  kNeesBounds,
-  kNisBounds,
+  kLost,
   kUnit,
   kUnused,
+  kNoMeasurement,
   kTruth,
   kUnobservable,
   kObservability,
+  kMostlyRejected,
   kRejectionRecovery,
+  kRecoveryFailed,
   kRepaired,
   kNotPd,
   kNotFinite,
-  kConditioning,
+  kDigitsLost,
   kGuarded,
+  kNonlinear,
   kNotConverged,
   kStale,
   kOutOfSequence,
@@ -76,18 +78,17 @@ inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kSensorDisabled, "sensor_disabled", EventSeverity::kWarning,
                   "the model of a sensor failed; the sensor is not used any more "
                   "(`on_plugin_failure: disable`)"},
-    EventKindInfo{EventKind::kInconsistent, "inconsistent", EventSeverity::kWarning,
+    EventKindInfo{EventKind::kLost, "lost", EventSeverity::kWarning,
                   "the error of a block element exceeded 10 sigma for 20 timestamps in a row; "
                   "requires truth"},
-    EventKindInfo{EventKind::kNeesBounds, "nees_bounds", EventSeverity::kWarning,
-                  "a mean NEES is outside its 95 % bounds"},
-    EventKindInfo{EventKind::kNisBounds, "nis_bounds", EventSeverity::kWarning,
-                  "a mean NIS is outside its 95 % bounds"},
     EventKindInfo{EventKind::kUnit, "unit", EventSeverity::kWarning,
                   "the measurements of a sensor are so far from their predictions that their unit "
-                  "may differ from the unit of the model"},
+                  "may differ from the unit of the model, or a role and its block have different "
+                  "units"},
     EventKindInfo{EventKind::kUnused, "unused", EventSeverity::kWarning,
                   "the estimator used no measurement of this sensor; the text states the reason"},
+    EventKindInfo{EventKind::kNoMeasurement, "no_measurement", EventSeverity::kWarning,
+                  "the estimator used no measurement of any sensor for a long time"},
     EventKindInfo{EventKind::kTruth, "truth", EventSeverity::kWarning,
                   "the source provides ground truth, but no frame contained a true value"},
     EventKindInfo{EventKind::kUnobservable, "unobservable", EventSeverity::kWarning,
@@ -95,9 +96,14 @@ inline constexpr std::array kEventKinds = {
     EventKindInfo{
         EventKind::kObservability, "observability", EventSeverity::kInfo,
         "unobservable directions were not computed, because the state has more than 500 elements"},
+    EventKindInfo{EventKind::kMostlyRejected, "mostly_rejected", EventSeverity::kWarning,
+                  "20 measurements of a sensor in a row were rejected, or more than half of its "
+                  "measurements over the run"},
     EventKindInfo{EventKind::kRejectionRecovery, "rejection_recovery", EventSeverity::kWarning,
-                  "a sensor reached the limit of consecutive rejections; the filter reset blocks "
-                  "or inflated their covariance"},
+                  "many measurements of a sensor in a row were rejected; the filter reset or "
+                  "inflated blocks"},
+    EventKindInfo{EventKind::kRecoveryFailed, "recovery_failed", EventSeverity::kWarning,
+                  "a sensor is still rejected after five recoveries"},
     EventKindInfo{
         EventKind::kRepaired, "repaired", EventSeverity::kWarning,
         "a covariance lost positive semi-definiteness and was repaired (`max_covariance_repairs`)"},
@@ -107,10 +113,15 @@ inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kNotFinite, "not_finite", EventSeverity::kWarning,
                   "a number of a measurement, step or update is not finite; the measurement, step "
                   "or update was not used"},
-    EventKindInfo{EventKind::kConditioning, "conditioning", EventSeverity::kWarning,
-                  "S is so ill-conditioned that the update loses digits"},
+    EventKindInfo{
+        EventKind::kDigitsLost, "digits_lost", EventSeverity::kWarning,
+        "rounding errors change the covariance by 1 % or more, because a prior is too vague "
+        "for an accurate measurement"},
     EventKindInfo{EventKind::kGuarded, "guarded", EventSeverity::kWarning,
                   "sigma points left the domain of a model and were moved closer to the estimate"},
+    EventKindInfo{EventKind::kNonlinear, "nonlinear", EventSeverity::kWarning,
+                  "a sensor is so nonlinear within the uncertainty of the state that the predicted "
+                  "mean and covariance are wrong"},
     EventKindInfo{EventKind::kNotConverged, "not_converged", EventSeverity::kWarning,
                   "an iteration ended before it converged"},
     EventKindInfo{EventKind::kStale, "stale", EventSeverity::kWarning,

@@ -21,10 +21,11 @@ enum class Fuse {
   kPerMeasurement,  ///< one update for each measurement, in the order of the sensors
 };
 
-/// Reaction to `rejection_recovery_after` consecutive rejections of one sensor.
+/// Reaction to consecutive rejections of one sensor (Recovery).
 enum class RejectionRecovery {
-  /// Re-initialises the block that the measurement determines. If this is not possible, acts as
-  /// kInflate.
+  /// Re-initialise the block that the measurement determines. If another block of the sensor
+  /// explains the innovation better, increase the variance of that block by the square of the
+  /// correction that the measurement requires. If neither is possible, inflate.
   kReset,
   kInflate,  ///< multiplies the covariance of the sensor's blocks by 100
   kNone,     ///< does nothing
@@ -45,8 +46,13 @@ struct EkfOptions {
   Fuse fuse = Fuse::kJoint;
   JacobianPolicy jacobian = JacobianPolicy::kLatest;
   RejectionRecovery rejection_recovery = RejectionRecovery::kReset;
-  int rejection_recovery_after = 20;  ///< consecutive rejections that start a recovery
-  int max_covariance_repairs = 10;    ///< the filter ends if one more repair is needed
+  /// Number of consecutive rejections of one sensor before the first recovery. The next four follow
+  /// after 2, 4, 8 and 16 times this number.
+  int rejection_recovery_after = 20;
+  /// Time without an accepted measurement of a rejected sensor, in s, before the first recovery.
+  /// The next four follow after 2, 4, 8 and 16 times this time. It suits sensors of a low rate.
+  double rejection_recovery_after_s = std::numeric_limits<double>::infinity();
+  int max_covariance_repairs = 10;  ///< the filter ends if one more repair is needed
   /// A gap longer than this is divided into equal steps of at most this length. The length is
   /// rounded to whole ns and is at least 1 ns.
   double max_dt_s = std::numeric_limits<double>::infinity();
@@ -56,11 +62,6 @@ namespace internal {
 
 class FilterEngine;
 class UpdateMethod;
-
-inline EkfOptions WithoutRecovery(EkfOptions options) {
-  options.rejection_recovery = RejectionRecovery::kNone;
-  return options;
-}
 
 }  // namespace internal
 

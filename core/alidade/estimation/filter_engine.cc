@@ -26,6 +26,8 @@ const EkfOptions& CheckedOptions(const EkfOptions& options) {
   ExpectOption(options.max_dt_s > 0.0, "max_dt_s", options.max_dt_s, "a time > 0 s");
   ExpectOption(options.rejection_recovery_after >= 1, "rejection_recovery_after",
                options.rejection_recovery_after, "at least 1");
+  ExpectOption(options.rejection_recovery_after_s > 0.0, "rejection_recovery_after_s",
+               options.rejection_recovery_after_s, "seconds > 0");
   ExpectOption(options.max_covariance_repairs >= 0, "max_covariance_repairs",
                options.max_covariance_repairs, "at least 0");
   return options;
@@ -49,7 +51,7 @@ FilterEngine::FilterEngine(Problem problem, const EkfOptions& options,
       time_(f.problem_index->problem, streams, options.max_dt_s),
       gate_(f.problem_index->problem, options),
       consensus_(f.problem_index->problem),
-      recovery_(options) {
+      recovery_(f.problem_index->problem, options) {
   if (f.problem_index->problem.landmarks) {
     landmarks.emplace(*f.problem_index);
     landmarks->AddKnown(f);
@@ -90,12 +92,12 @@ void FilterEngine::Process(const Frame& frame) {
   const auto is_not_pd = [](const PendingMeasurement& pending) {
     return pending.report->outcome == Outcome::kNotPd;
   };
-  if (std::ranges::any_of(rows, is_not_pd)) recovery_.RepairCovariance(f);
+  if (std::ranges::any_of(rows, is_not_pd)) recovery_.RepairCovariance(f, *method);
   if (f.health.ended) return;
   for (PendingMeasurement& pending : rows) {
     if (landmarks && pending.binding->model->has_landmark())
-      continue;  // rejected measurements of landmarks do not cause a recovery
-    if (gate_.Count(f, *pending.report)) recovery_.Recover(f, pending);
+      continue;  // rejected landmarks do not cause a recovery
+    recovery_.Count(f, pending, *method);
   }
   AddElapsedTo(FramePart::kUpdate);
   if (!landmarks) return;

@@ -33,7 +33,7 @@ void ExpectOption(bool in_range, const char* option, double value, const char* e
 ///   gate                           UpdateMethod::ComputeNis and Gate::Test of each measurement;
 ///                                  Consensus::Split
 ///   correct      Correct           Gate::ApplyRobustWeights, UpdateMethod::Correct
-///   recover                        Recovery::RepairCovariance; Gate::Count, Recovery::Recover
+///   recover                        Recovery::RepairCovariance, Recovery::Count
 ///   landmarks                      LandmarkMap::Maintain
 ///   inputs                         Timeline::TakeInputs, which act from the frame's timestamp on
 ///

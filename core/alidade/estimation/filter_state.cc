@@ -15,7 +15,7 @@ FilterState::FilterState(std::shared_ptr<const ProblemIndex> index, bool uses_fi
       first_estimates(problem_index->problem.layout.blocks().size()),
       uses_first_estimates_(uses_first_estimates) {
   health.out_of_domain.assign(problem_index->sensor_places.size(), 0);
-  health.inflated = health.out_of_domain;
+  health.digits_lost.assign(problem_index->sensor_places.size(), 0);
   Activate();
 }
 

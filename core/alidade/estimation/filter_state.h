@@ -18,9 +18,9 @@ namespace alidade::internal {
 /// Health of a filter. Also records which faults were already reported, because a fault is not
 /// reported repeatedly.
 struct Health {
-  /// By sensor: whether h was not defined (out_of_domain), or whether blocks were inflated
-  /// (inflated), since the last accepted measurement of the sensor.
-  std::vector<char> out_of_domain, inflated;
+  /// By sensor: whether h was not defined since its last accepted measurement.
+  std::vector<char> out_of_domain;
+  std::vector<char> digits_lost;  ///< by sensor: whether CheckDigits reported it
   bool diverged = false, ended = false;
   /// Last measurement that an update used.
   struct {
@@ -30,9 +30,9 @@ struct Health {
   } last_used;
 };
 
-/// State shared by the parts of a filter: x and P, the time, the motion models and the report. An
-/// UpdateMethod may store a root of P. Therefore only an UpdateMethod may change P of blocks that
-/// have a value. The comments of other functions that change P state this. A copy is a snapshot.
+/// State shared by the parts of a filter: x and P, the time, the motion models, the report. Only an
+/// UpdateMethod and Recovery change P of blocks that have a value. An UpdateMethod may store a root
+/// of P, so Recovery calls UpdateMethod::Begin afterwards. A copy is a snapshot.
 struct FilterState {
   FilterState(std::shared_ptr<const ProblemIndex> index, bool uses_first_estimates);
 

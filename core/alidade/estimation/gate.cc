@@ -6,28 +6,10 @@
 #include <limits>
 
 #include "alidade/base/all_finite.h"
-#include "alidade/base/number_text.h"
 #include "alidade/base/statistics.h"
 
 namespace alidade::internal {
-namespace {
-
-/// Returns whether the outcome of a measurement counts as a rejection. A measurement z that is not
-/// finite does not count. Its h is empty, because no model was called.
-bool IsRejected(const MeasurementReport& entry) {
-  return InfoOf(entry.outcome).is_rejection &&
-         (entry.outcome != Outcome::kNotFinite || !entry.h.empty());
-}
-
-}  // namespace
-
-Gate::Gate(const Problem& problem, const EkfOptions& options)
-    : has_gate_(options.gate < 1.0),
-      is_warned_(problem.sensors.size(), false),
-      rejections_(problem.sensors.size(), 0),
-      max_rejections_(options.rejection_recovery == RejectionRecovery::kNone
-                          ? 0
-                          : options.rejection_recovery_after) {
+Gate::Gate(const Problem& problem, const EkfOptions& options) : has_gate_(options.gate < 1.0) {
   for (const SensorBinding& sensor : problem.sensors) {
     has_robust_loss_ |= sensor.loss.kind != LossKind::kNone;
     thresholds_.push_back(
@@ -41,9 +23,8 @@ Gate::Gate(const Problem& problem, const EkfOptions& options)
   if (!std::isfinite(nis)) {
     const Outcome outcome = CheckFinite(f, pending);
     if (outcome != Outcome::kAccepted) return outcome;
-    if (!has_gate_ && !std::isnan(nis)) return Accept(f, pending, nis);
+    if (!has_gate_ && !std::isnan(nis)) return Accept(pending, nis);
   }
-  CheckConditioning(f, pending);
   pending.report->nis = std::isnan(nis) ? 0.0 : nis;
   if (!std::isnan(nis)) return Outcome::kGated;
   AddEvent(f, EventKind::kNotPd,
@@ -84,27 +65,6 @@ void Gate::ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const {
       pending->R[i] = widened;
     }
   }
-}
-
-/// Counts a measurement that was not accepted. Returns the result of Count.
-[[gnu::noinline]] bool Gate::CountRejection(const MeasurementReport& entry) {
-  if (max_rejections_ == 0 || !IsRejected(entry)) return false;
-  int& count = rejections_[static_cast<std::size_t>(entry.sensor)];
-  if (++count < max_rejections_) return false;
-  count = 0;
-  return true;
-}
-
-/// Reports once for each sensor that its noise is negligible compared with H P H'.
-[[gnu::noinline]] void Gate::WarnOfConditioning(FilterState& f, const PendingMeasurement& pending,
-                                                std::size_t i) {
-  const auto sensor = static_cast<std::size_t>(pending.sensor);
-  if (is_warned_[sensor]) return;
-  is_warned_[sensor] = true;
-  AddEvent(f, EventKind::kConditioning,
-           "sensor '" + pending.binding->name + "': the noise variance " +
-               RoundedText(pending.R[i], 3) + " is negligible compared with H P H' = " +
-               RoundedText(pending.s[i] - pending.R[i], 3) + "; S is badly conditioned");
 }
 
 }  // namespace alidade::internal

@@ -1,30 +1,58 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <vector>
+
 #include "alidade/estimation/filter.h"
-#include "alidade/estimation/pending_measurements.h"
+#include "alidade/estimation/update_method.h"
 
 namespace alidade::internal {
 
-/// Recovery of a filter. Repairs P if rounding errors made P indefinite. Resets or inflates blocks
-/// if too many consecutive measurements of a sensor were rejected. A copy is a snapshot.
+/// Recovery of a filter. Repairs P if rounding errors made it indefinite. Counts the consecutive
+/// rejections of each sensor, and resets or inflates blocks if there are too many. A copy is a
+/// snapshot.
+///
+/// After N = rejection_recovery_after rejections in a row, or after rejection_recovery_after_s
+/// without an accepted measurement, a recovery is attempted. If the sensor is still rejected, the
+/// next attempt follows after 2 N, then 4 N, 8 N and 16 N rejections, or the respective time. After
+/// kMaxAttempts attempts, the recovery has failed (event `recovery_failed`).
 class Recovery {
  public:
-  explicit Recovery(const EkfOptions& options) : options_(options) {}
+  static constexpr int kMaxAttempts = 5;
+  /// Number of consecutive rejections of a sensor at which the event `mostly_rejected` occurs.
+  static constexpr int kMostlyRejected = 20;
 
-  /// Must be called after an update whose S was not positive definite. If P = L D L' is not
-  /// positive semi-definite, sets the negative pivots to zero (event `repaired`). Ends the filter
-  /// if more than max_covariance_repairs repairs are needed.
-  void RepairCovariance(FilterState& f);
-  /// Must be called when too many consecutive measurements of a sensor were rejected. Resets the
-  /// block that the measurement determines (event `rejection_recovery`). Sets the covariance of the
-  /// other blocks of the same motion model to an upper bound of prior and current covariance. If a
-  /// reset is not possible, inflates the covariance of the sensor's blocks. A second inflation is
-  /// possible only after a measurement of the sensor was accepted.
-  void Recover(FilterState& f, PendingMeasurement& pending);
+  explicit Recovery(const Problem& problem, const EkfOptions& options)
+      : options_(options), sensors_(problem.sensors.size()) {}
+
+  /// Called after an update whose S was not positive definite. If P = L D L' is not positive
+  /// semi-definite, sets its negative pivots to zero (event `repaired`). Ends the filter if more
+  /// than max_covariance_repairs repairs are needed.
+  void RepairCovariance(FilterState& f, UpdateMethod& method);
+  /// Counts the outcome of a measurement, and recovers if an attempt is due.
+  void Count(FilterState& f, PendingMeasurement& pending, UpdateMethod& method) {
+    const Outcome outcome = pending.report->outcome;
+    if (outcome != Outcome::kAccepted && outcome != Outcome::kInitialised) {
+      return CountRejection(f, pending, method);
+    }
+    sensors_[static_cast<std::size_t>(pending.sensor)] = {.last_accepted = f.timestamp};
+    f.health.out_of_domain[static_cast<std::size_t>(pending.sensor)] = 0;
+  }
 
  private:
+  /// Rejections of a sensor since its last accepted measurement.
+  struct Rejections {
+    int count = 0;
+    int attempts = 0;                        ///< attempts of a recovery
+    Timestamp last_accepted = kNoTimestamp;  ///< or the first rejection, if none was accepted
+  };
+
+  void CountRejection(FilterState& f, PendingMeasurement& pending, UpdateMethod& method);
+  bool IsDue(const FilterState& f, const Rejections& rejections) const;
+  std::string Recover(FilterState& f, PendingMeasurement& pending) const;
+
   EkfOptions options_;
+  std::vector<Rejections> sensors_;
   int repairs_ = 0;
 };
 

@@ -11,36 +11,40 @@
 namespace alidade {
 
 namespace internal {
-class RecordingEquations;
+class SquareRootEquations;
 }
 
 /// Fixed-interval smoother: estimates the state at every frame from the measurements of all frames.
-/// The forward pass is an extended Kalman filter. The backward pass is the smoother of Rauch, Tung
-/// and Striebel in the adjoint form of Bryson and Frazier. This form does not invert a covariance,
-/// so P may be singular. n: size of P.
+/// The forward pass is SquareRootEkf. The backward pass computes the same estimates as the smoother
+/// of Rauch, Tung and Striebel from the orthogonal matrices of the forward pass. It neither
+/// subtracts covariances nor inverts them. P may therefore be singular, and a vague prior costs few
+/// digits.
 ///
-///   estimate   x_s = x (+) P lambda,   P_s = P - P Lambda P      x, P: estimate of the filter
-///   start      lambda = 0, Lambda = 0                            at the last frame
-///   step       lambda <- F' lambda,   Lambda <- F' Lambda F
-///   update     lambda <- A' lambda + H' S^-1 r,   Lambda <- A' Lambda A + H' S^-1 H,
-///              A = I - K H
+/// The forward pass describes the state as x (+) D u with u ~ N(0, I), P = D D'. The array of each
+/// step and of each update is triangularised by an orthogonal matrix Q = [Q11 Q12; Q21 Q22]. The
+/// backward pass computes the distribution of u given all measurements, u ~ N(mu, A A'):
 ///
-/// Discrete noise w, which is constant over an interval, is smoothed together with x. At frames
-/// inside an interval, lambda and Lambda belong to (x, w). [P M] then replaces P, with M = Cov(x,
-/// w), and [F G Lq; 0 I] replaces F. At the start of the interval, the elements of w are removed
-/// from lambda and Lambda.
+///   estimate   x_s = x (+) D mu,   P_s = (D A) (D A)'
+///   start      mu = 0, A = I                                      at the last frame
+///   step       [u; w] = Q [u+; v]:   mu <- Q11 mu,                A A' <- [Q11 A, Q12] [...]'
+///   update     [n; u] = Q [Ls^-1 r; u+]:   mu <- Q21 Ls^-1 r + Q22 mu,   A <- Q22 A
 ///
-/// The backward pass uses the Jacobians, R and robust weights of the forward pass.
+/// w and n are the noise of the step and of the measurement, u+ is u after the step or update, and
+/// v has no effect on the state after the step. A is triangularised again after each step. Discrete
+/// noise is a part of u during its interval, and D = [B M].
 ///
-/// Source       [Rauch1965]; [Bierman1977] ch. X, modified Bryson-Frazier.
+/// Jacobians, R and robust weights are those of the forward pass. If the forward pass recovers from
+/// rejections, later measurements do not change the estimates before the recovery.
+///
+/// Source       [Rauch1965] the smoothed estimates; [Bierman1977] ch. V, X, the arrays.
 class RtsSmoother : public Estimator {
  public:
   /// Does not support consider blocks or roles, blocks that start from a measurement, roles with
-  /// `jacobian_at: measurement`, rejection recovery, or landmarks.
-  static constexpr EstimatorCapabilities kCapabilities = {};
+  /// `jacobian_at: measurement`, or landmarks.
+  static constexpr EstimatorCapabilities kCapabilities = {.recovery = true};
 
-  /// `options.rejection_recovery` is ignored, because the smoother does not support recovery.
-  /// Throws Error kBadConfig if `problem` needs more than kCapabilities.
+  /// Throws Error kBadConfig if
+  /// `problem` needs more than kCapabilities.
   RtsSmoother(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams);
   explicit RtsSmoother(const Problem& problem, const EkfOptions& options = {})
       : RtsSmoother(problem, options, problem.streams) {}
@@ -49,9 +53,7 @@ class RtsSmoother : public Estimator {
   void Start(Timestamp timestamp) override;
   const UpdateReport& Process(const Frame& frame) override;
   bool offline() const override { return true; }
-  /// Passes the reports of the forward pass to `emit`. If rounding makes a smoothed variance of a
-  /// frame negative, the covariance of the forward pass replaces the smoothed covariance (event
-  /// `not_pd`).
+  /// The reports are those of the forward pass.
   void Smooth(const Emit& emit) override;
   const State& state() const override;
   Timestamp timestamp() const override;
@@ -61,9 +63,9 @@ class RtsSmoother : public Estimator {
  private:
   struct ForwardFrame;
   RtsSmoother(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams,
-              std::unique_ptr<internal::RecordingEquations> equations);
+              std::unique_ptr<internal::SquareRootEquations> equations);
 
-  internal::RecordingEquations* equations_;  ///< points to the method of engine_
+  internal::SquareRootEquations* equations_;  ///< points to the method of engine_
   std::unique_ptr<internal::FilterEngine> engine_;
   std::vector<ForwardFrame> forward_frames_;
 };

@@ -31,11 +31,11 @@ namespace alidade {
 class SquareRootEkf : public Filter {
  public:
   /// Does not support consider blocks or roles, blocks that start from a measurement, roles with
-  /// `jacobian_at: measurement`, rejection recovery, or landmarks.
-  static constexpr EstimatorCapabilities kCapabilities = {};
+  /// `jacobian_at: measurement`, or landmarks.
+  static constexpr EstimatorCapabilities kCapabilities = {.recovery = true};
 
-  /// `options.rejection_recovery` is ignored, because the filter does not support recovery. Throws
-  /// Error kBadConfig if `problem` needs more than kCapabilities.
+  /// Throws Error kBadConfig if
+  /// `problem` needs more than kCapabilities.
   SquareRootEkf(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams);
   explicit SquareRootEkf(const Problem& problem, const EkfOptions& options = {})
       : SquareRootEkf(problem, options, problem.streams) {}

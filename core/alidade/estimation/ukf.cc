@@ -9,6 +9,7 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
+#include "alidade/estimation/digits_lost.h"
 #include "alidade/estimation/filter_engine.h"
 #include "alidade/estimation/stacked_measurements.h"
 #include "alidade/estimation/update_method.h"
@@ -77,7 +78,9 @@ class UkfEquations : public UpdateMethod {
     return std::make_unique<UkfEquations>(*this);
   }
   void Begin(FilterState& f) override {
-    is_guarded_.assign(f.problem_index->sensor_places.size() + 1, false);
+    is_guarded_.resize(f.problem_index->sensor_places.size() + 1, false);
+    is_nonlinear_.resize(f.problem_index->sensor_places.size(), false);
+    root_is_current_ = false;
   }
   StepError Step(FilterState& f, double dt_s) override;
   Outcome Predict(FilterState& f, PendingMeasurement& pending) override;
@@ -112,6 +115,8 @@ class UkfEquations : public UpdateMethod {
   Outcome StackPoints(FilterState& f, std::span<PendingMeasurement* const> rows, int halvings,
                       StackedMeasurements& stacked, Workspace::Vector& mean);
   void ReportGuard(FilterState& f, std::size_t index, int halvings, bool is_sufficient);
+  void ReportNonlinearity(FilterState& f, const PendingMeasurement& pending,
+                          SigmaPrediction& prediction);
 
   UkfOptions options_;
   Eigen::MatrixXd root_;  ///< A, with P = A A'
@@ -120,6 +125,7 @@ class UkfEquations : public UpdateMethod {
   std::vector<SigmaPrediction> predictions_;  ///< by index of the measurement's report
   /// By sensor: whether a reduced spread was reported. The last element is for the motion models.
   std::vector<bool> is_guarded_;
+  std::vector<bool> is_nonlinear_;  ///< by sensor: whether its nonlinearity was reported
   // Reused memory.
   Eigen::MatrixXd conditional_covariance_, conditional_root_;
   Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt_;
@@ -205,6 +211,34 @@ void UkfEquations::ReportGuard(FilterState& f, std::size_t index, int halvings,
                  "; their spread is divided by " + std::to_string(1 << halvings));
   }
   is_guarded_[index] = is_guarded;
+}
+
+/// Reports once for each sensor that the curvature of h shifts the mean by more than the standard
+/// deviation that the slope of h predicts. `pending` contains R.
+void UkfEquations::ReportNonlinearity(FilterState& f, const PendingMeasurement& pending,
+                                      SigmaPrediction& prediction) {
+  constexpr double kLargestRatio = 1.0;
+  const auto sensor = static_cast<std::size_t>(pending.sensor);
+  // A reduced spread is reported by ReportGuard.
+  if (is_nonlinear_[sensor] || prediction.halvings > 0) return;
+  const Workspace::Matrix points = prediction.f();
+  const Eigen::Index m = points.rows(), n = points.cols() / 2;
+  const double w = TransformOf(n, prediction.halvings).w;
+  double ratio = 0.0;
+  for (Eigen::Index k = 0; k < m; ++k) {
+    const auto plus = points.row(k).head(n), minus = points.row(k).tail(n);
+    const double variance =
+        0.5 * w * (plus - minus).squaredNorm() + pending.R[static_cast<std::size_t>(k * (m + 1))];
+    ratio = std::max(ratio, w * (plus + minus).lpNorm<1>() / std::sqrt(variance));
+  }
+  if (!(ratio > kLargestRatio)) return;
+  is_nonlinear_[sensor] = true;
+  AddEvent(f, EventKind::kNonlinear,
+           "sensor '" + pending.binding->name +
+               "': the curvature of h within the sigma points shifts the predicted mean by " +
+               RoundedText(ratio, 3) +
+               " times the standard deviation that the slope of h predicts; use iekf, a narrower "
+               "prior or another alpha");
 }
 
 /// Propagates one sigma point by all active models with the noise w = `noise`, and writes x' to
@@ -353,16 +387,17 @@ Outcome UkfEquations::Predict(FilterState& f, PendingMeasurement& pending) {
       ReportGuard(f, static_cast<std::size_t>(pending.sensor), halvings, !is_too_wide);
     }
   }
-  if (outcome == Outcome::kAccepted) {
-    outcome = NoiseAt(pending, RolesAt(f, pending, f.state.values()));
+  if (outcome == Outcome::kAccepted) {  // computes R; only CheckDigits uses H
+    outcome = LineariseAt(pending, RolesAt(f, pending, f.state.values()));
   }
   if (outcome == Outcome::kAccepted) {
+    ReportNonlinearity(f, pending, prediction);
     std::ranges::copy(prediction.h, pending.h);
     std::ranges::copy(prediction.innovation, pending.innovation);
     pending.report->h = {pending.h, prediction.h.size()};
     pending.report->innovation = {pending.innovation, prediction.innovation.size()};
-    pending.H.clear();  // the UKF does not compute a Jacobian
   } else if (!is_too_wide) {
+    pending.report->h = {};
     ReportRefusal(f, pending, outcome);
   }
   return outcome;
@@ -417,7 +452,8 @@ Outcome UkfEquations::Correct(FilterState& f, std::span<PendingMeasurement* cons
     halvings = std::max(halvings, PredictionOf(f, *pending).halvings);
   }
   StackedMeasurements stacked{f.work.Take(m, 2 * n), f.work.Take(m, m), f.work.Take(m)};
-  Workspace::Vector mean = f.work.Take(m), centre = f.work.Take(n), step = f.work.Take(n);
+  Workspace::Vector mean = f.work.Take(m), inverse_d = f.work.Take(m);
+  Workspace::Vector centre = f.work.Take(n), step = f.work.Take(n);
   Workspace::Matrix s = f.work.Take(m, m), p = f.work.Take(n, n),
                     deviations = f.work.Take(n, 2 * n);  // first dx_i, later dx_i - K f_i
   Workspace::Matrix gain = f.work.Take(n, m), gain_noise = f.work.Take(n, m);  // K, K R
@@ -444,6 +480,12 @@ Outcome UkfEquations::Correct(FilterState& f, std::span<PendingMeasurement* cons
   AddProductWithTransposed(p, gain_noise, gain);
   if (!f.state.Retract(step.data(), f.moved) || !p.allFinite()) return Outcome::kNotFinite;
   f.state.covariance().SetBlock(0, 0, p);
+  inverse_d = s.diagonal().array().square().inverse();
+  Eigen::Index offset = 0;
+  for (const PendingMeasurement* const pending : rows) {
+    CheckDigits(f, *pending, inverse_d.data() + offset);
+    offset += pending->report->dof;
+  }
   f.state.MoveTo(f.moved);
   root_is_current_ = false;
   RecordGain(f, rows, gain);
@@ -462,8 +504,7 @@ UkfEquations::SigmaPrediction& UkfEquations::PredictionOf(const FilterState& f,
 }  // namespace internal
 
 Ukf::Ukf(Problem problem, const UkfOptions& options, const std::vector<StreamInfo>& streams)
-    : Filter(CheckedProblem(std::move(problem), "Ukf", kCapabilities),
-             internal::WithoutRecovery(options.filter), streams,
+    : Filter(CheckedProblem(std::move(problem), "Ukf", kCapabilities), options.filter, streams,
              std::make_unique<internal::UkfEquations>(options)) {
   internal::ExpectOption(options.alpha >= UkfOptions::kMinAlpha && options.alpha <= 1.0, "alpha",
                          options.alpha, "a number from UkfOptions::kMinAlpha to 1");

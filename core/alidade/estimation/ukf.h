@@ -14,8 +14,8 @@ struct UkfOptions {
   /// about 1e-8 |y| at the minimum.
   static constexpr double kMinAlpha = 1e-4;
 
-  EkfOptions filter;    ///< `jacobian` and `rejection_recovery` are ignored
-  double alpha = 0.01;  ///< spread of the sigma points, in [1e-4, 1]
+  EkfOptions filter;   ///< gate, fuse and max_dt_s, rejection recovery
+  double alpha = 0.4;  ///< spread of the sigma points, in [1e-4, 1]
   double beta = 2.0;  ///< weight of the centre in the covariance, >= 0; 2 is optimal for a Gaussian
   double kappa = 0.0;  ///< parameter of the spread c^2 = alpha^2 (N + kappa); >= 0
 };
@@ -51,8 +51,8 @@ struct UkfOptions {
 class Ukf : public Filter {
  public:
   /// Does not support consider blocks or roles, blocks that start from a measurement, roles with
-  /// `jacobian_at: measurement`, rejection recovery, or landmarks.
-  static constexpr EstimatorCapabilities kCapabilities = {};
+  /// `jacobian_at: measurement`, or landmarks.
+  static constexpr EstimatorCapabilities kCapabilities = {.recovery = true};
 
   /// Throws Error kBadConfig if `problem` needs more than kCapabilities, or an option is out of
   /// range.

@@ -18,7 +18,7 @@ class UpdateMethod {
 
   /// Returns the square root of P if the method stores one, else null.
   virtual const Eigen::MatrixXd* Root() const { return nullptr; }
-  /// Prepares the method for the initial x and P. Must be called once, before the first frame.
+  /// Called before the first frame with the initial x and P, and after a recovery changed x or P.
   virtual void Begin(FilterState& /*f*/) {}
   /// Propagates x and P by dt_s. If this fails, returns the error and leaves x and P unchanged.
   virtual StepError Step(FilterState& f, double dt_s) = 0;

@@ -72,6 +72,15 @@ double SquaredMahalanobis(const Eigen::MatrixXd& p, const Eigen::VectorXd& error
   return std::isfinite(squared) ? squared : std::nan("");
 }
 
+double LogDeterminant(std::span<const double> p, int n) {
+  constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
+  if (n <= 0 || std::ssize(p) != std::ptrdiff_t{n} * n) return kNotANumber;
+  if (n == 1) return p[0] > 0.0 ? std::log(p[0]) : kNotANumber;
+  const Eigen::LLT<Eigen::MatrixXd> llt(Eigen::Map<const Eigen::MatrixXd>(p.data(), n, n));
+  if (llt.info() != Eigen::Success) return kNotANumber;
+  return 2.0 * llt.matrixLLT().diagonal().array().log().sum();
+}
+
 SymmetricEigen EigenOf(const Eigen::MatrixXd& symmetric) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(symmetric);
   return {solver.eigenvalues(), solver.eigenvectors()};

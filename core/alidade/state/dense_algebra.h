@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <span>
 
 #include "alidade/state/jacobian_rows.h"
 
@@ -33,6 +34,10 @@ double SquareRootOf(const Eigen::Ref<const Eigen::MatrixXd>& p, Eigen::LDLT<Eige
 /// Returns e' P^-1 e, or NaN if P is singular, indefinite or not finite. First scales P to unit
 /// variances, so that the test for singularity does not depend on units.
 double SquaredMahalanobis(const Eigen::MatrixXd& p, const Eigen::VectorXd& error);
+
+/// Returns log det P of a symmetric, positive definite P, n x n, row-major; NaN if P is not
+/// positive definite or has not n x n elements.
+double LogDeterminant(std::span<const double> p, int n);
 
 /// Eigenvalues l, in increasing order, and eigenvectors V of A = V diag(l) V'.
 struct SymmetricEigen {

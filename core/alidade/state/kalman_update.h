@@ -55,6 +55,8 @@ class KalmanUpdate {
   /// Copies columns of P H' to `destination`, which has n rows. After Solve(), copies columns of W
   /// instead.
   void CopyColumns(int column, Eigen::Ref<Eigen::MatrixXd> destination) const;
+  /// Returns the reciprocals of the pivots D.
+  const double* inverse_d() const { return update_.inverse_d; }
   double w(int i, int j) const { return update_.At(update_.w, i, j); }
   /// Copies l = L sqrt(D) to the lower triangle of an m x m matrix, so that S = L D L' = l l'.
   void CopyFactor(Eigen::Ref<Eigen::MatrixXd> l) const;

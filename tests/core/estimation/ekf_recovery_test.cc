@@ -2,10 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <type_traits>
+#include <vector>
 
 #include "alidade/estimation/rts.h"
 #include "alidade/estimation/square_root_ekf.h"
 #include "alidade/estimation/ukf.h"
+#include "sensors/pose.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -186,14 +190,15 @@ TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
 }
 
 // Tests fault 77 of tests/faults/README.md.
-TEST(Ekf, ASensorThatStaysOutOfItsDomainInflatesOnceAndNotWhatItHolds) {
+TEST(Ekf, ASensorThatStaysOutOfItsDomainDoesNotInflateKnownRoles) {
   Problem problem = DepthFilter();
   problem.sensors.erase(problem.sensors.begin());
   problem.sensors[0].roles[1].mode = RoleMode::kKnown;
   problem.priors[0].mean = {-1.0};
   Ekf ekf(problem, {}, StreamsOf(problem));
   for (int k = 0; k < 100; ++k) ekf.Process(FrameAt(0.0, {{0, 1.0}}));
-  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"), 1.0, 1e-12);
+  // There are attempts after 20, 40 and 80 rejections. The prior variance is 0.01.
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"), 1e4, 1e-8);
   EXPECT_EQ(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
             0.25);
 }
@@ -244,30 +249,148 @@ TEST(Ekf, AResetMakesNothingMoreCertainThanItWas) {
   EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth", "target.depth_rate"), 0.0);
 }
 
-// These filters maintain more than P, so they do not support a change of P by another component.
+/// Returns the filter of a type with a gate of 0.999.
 template <class Type>
-class WithoutRecovery : public ::testing::Test {};
-using CarryMore = ::testing::Types<SquareRootEkf, Ukf, RtsSmoother>;
-TYPED_TEST_SUITE(WithoutRecovery, CarryMore);
-
-TYPED_TEST(WithoutRecovery, LeavesTheCovarianceAsItIs) {
-  const Problem problem = DepthFilter();
-  using Options = std::conditional_t<std::is_same_v<TypeParam, Ukf>, UkfOptions, EkfOptions>;
-  Options options;
-  if constexpr (std::is_same_v<TypeParam, Ukf>) {
-    options.filter.gate = 0.999;
+Type MakeFilter(const Problem& problem, EkfOptions options = {}) {
+  options.gate = 0.999;
+  if constexpr (std::is_same_v<Type, Ukf>) {
+    UkfOptions of_ukf;
+    of_ukf.filter = options;
+    return Ukf(problem, of_ukf, StreamsOf(problem));
   } else {
-    options.gate = 0.999;
+    return Type(problem, options, StreamsOf(problem));
   }
-  TypeParam filter(problem, options, StreamsOf(problem));
-  filter.Start(0);
-  const Eigen::MatrixXd p = filter.state().covariance().Dense();
-  for (int k = 0; k < 50; ++k) {
-    const UpdateReport& report = filter.Process(FrameAt(0.0, {{0, 2000.0}}));
-    EXPECT_EQ(report.measurements()[0].outcome, Outcome::kGated);
-    EXPECT_TRUE(report.events.empty());
+}
+
+template <class Type>
+class EveryFilter : public ::testing::Test {};
+using Filters = ::testing::Types<Ekf, SquareRootEkf, Ukf, RtsSmoother>;
+TYPED_TEST_SUITE(EveryFilter, Filters);
+
+// The disparity 65 implies the depth 0.4, and its sigma 0.4^2 / 26. 20 measurements are rejected.
+TYPED_TEST(EveryFilter, ResetsABlockAndThenAcceptsItsMeasurements) {
+  Problem problem = DepthFilter();
+  problem.priors[0].mean = {3.0};
+  problem.priors[0].covariance(0, 0) = 1e-6;
+  TypeParam filter = MakeFilter<TypeParam>(problem);
+  for (int k = 0; k < 20; ++k) filter.Process(FrameAt(0.0, {{0, 65.0}}));
+  EXPECT_NEAR(ValueOf(filter.state(), "target.depth"), 0.4, 1e-12);
+  EXPECT_NEAR(CovarianceOf(filter.state(), "target.depth", "target.depth"),
+              std::pow(0.4 * 0.4 / 26.0, 2), 1e-15);
+  for (int k = 0; k < 3; ++k) {
+    const UpdateReport& report = filter.Process(FrameAt(0.0, {{0, 65.0}}));
+    EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
   }
-  EXPECT_LT((filter.state().covariance().Dense() - p).norm(), 1e-12);
+  EXPECT_NEAR(CovarianceOf(filter.state(), "target.depth", "target.depth"),
+              std::pow(0.4 * 0.4 / 26.0, 2) / 4.0, 1e-8);
+}
+
+// The sigma of x is 0.01 at first, and the jump is 10. At the third attempt, after 12 rejections,
+// the sigma is 10.
+TYPED_TEST(EveryFilter, InflatesUntilAMeasurementIsAccepted) {
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 0.01}});
+  AddSensor(problem, "z", LinearSensor(1.0, 0.01), {"p.x"});
+  EkfOptions options;
+  options.rejection_recovery = RejectionRecovery::kInflate;
+  options.rejection_recovery_after = 3;
+  TypeParam filter = MakeFilter<TypeParam>(problem, options);
+  std::vector<int> recoveries;
+  int first_accepted = -1;
+  for (int k = 1; first_accepted < 0 && k < 100; ++k) {
+    const UpdateReport& report = filter.Process(FrameAt(0.0, {{0, 10.0}}));
+    if (HasEvent(report, EventKind::kRejectionRecovery)) recoveries.push_back(k);
+    if (report.measurements()[0].outcome == Outcome::kAccepted) first_accepted = k;
+  }
+  EXPECT_EQ(recoveries, (std::vector<int>{3, 6, 12}));
+  EXPECT_EQ(first_accepted, 13);
+  EXPECT_NEAR(ValueOf(filter.state(), "p.x"), 10.0, 1e-3);
+}
+
+// The smoother treats the data before and after the reset separately: later measurements do not
+// change earlier estimates.
+TEST(RtsSmoother, ARecoveryEndsTheSmoothingOfEarlierFrames) {
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 0.01}});
+  AddSensor(problem, "z", LinearSensor(1.0, 0.01), {"p.x"});
+  EkfOptions options;
+  options.rejection_recovery_after = 3;
+  RtsSmoother rts = MakeFilter<RtsSmoother>(problem, options);
+  for (int k = 0; k < 10; ++k) rts.Process(FrameAt(0.1 * k, {{0, k < 4 ? 0.0 : 10.0}}));
+  std::vector<double> x;
+  rts.Smooth([&](std::size_t, const State& state, const UpdateReport&) {
+    x.push_back(ValueOf(state, "p.x"));
+  });
+  ASSERT_EQ(x.size(), 10u);
+  EXPECT_NEAR(x[0], 0.0, 1e-12);
+  EXPECT_NEAR(x[5], 0.0, 1e-12);
+  EXPECT_NEAR(x[9], 10.0, 1e-12);
+}
+
+TEST(Ekf, RecoversAfterATimeIfTheSensorIsSlow) {
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 0.01}});
+  AddSensor(problem, "z", LinearSensor(1.0, 0.01), {"p.x"});
+  EkfOptions options;
+  options.rejection_recovery_after_s = 3.0;
+  Ekf ekf = MakeFilter<Ekf>(problem, options);
+  ekf.Process(FrameAt(0.0, {{0, 0.0}}));
+  for (int k = 1; k <= 3; ++k) {
+    const UpdateReport& report = ekf.Process(FrameAt(1.0 * k, {{0, 10.0}}));
+    EXPECT_EQ(HasEvent(report, EventKind::kRejectionRecovery), k == 3) << k;
+  }
+  EXPECT_NEAR(ValueOf(ekf.state(), "p.x"), 10.0, 1e-12);
+}
+
+// The block of the sensor is constant, so no recovery helps.
+TEST(Ekf, ReportsThatTheRecoveryFailedAfterFiveAttempts) {
+  Ekf ekf = MakeFilter<Ekf>(WithStatus(DepthFilter(), "target.depth", BlockStatus::kConstant));
+  const Frame frame = FrameAt(0.0, {{0, 2000.0}});
+  std::map<EventKind, std::vector<int>> seen;
+  for (int k = 1; k <= 2000; ++k) {
+    for (const Event& event : ekf.Process(frame).events) seen[event.kind].push_back(k);
+  }
+  EXPECT_EQ(seen[EventKind::kMostlyRejected], (std::vector<int>{20}));
+  EXPECT_EQ(seen[EventKind::kRejectionRecovery], (std::vector<int>{20, 40, 80, 160, 320}));
+  EXPECT_EQ(seen[EventKind::kRecoveryFailed], (std::vector<int>{640}));
+}
+
+/// Motion model of a body that does not move.
+struct Still : Motion<1, Vec<3>, UnitQuaternion> {
+  static constexpr std::array kBlocks{Quantity{"position"}, Quantity{"orientation"}};
+  template <class T>
+  void Step(const T* p, const T* q, const T*, double, T* next_p, T* next_q) const {
+    for (int i = 0; i < 3; ++i) next_p[i] = p[i];
+    for (int i = 0; i < 4; ++i) next_q[i] = q[i];
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
+};
+
+// A pose sensor determines the position, but here its yaw jumps by 1 rad. The recovery must correct
+// the orientation: w = cos 0.5, z = sin 0.5.
+TYPED_TEST(EveryFilter, CorrectsTheBlockThatExplainsTheRejections) {
+  Problem problem;
+  MotionBinding body{"body", MakeMotion(Still(), "still"), {}};
+  for (const Space& block : body.model->blocks()) {
+    const BlockId id = problem.layout.Declare("body." + block.name, "body", block);
+    body.blocks.push_back(id);
+    Prior prior;
+    prior.block = id;
+    prior.mean = problem.layout[id].geometry().Identity();
+    prior.covariance = 1e-4 * Eigen::MatrixXd::Identity(3, 3);
+    problem.priors.push_back(prior);
+  }
+  problem.motions.push_back(body);
+  AddSensor(problem, "pose", MakeSensor(Pose({0.01, 0.01, 0.01}, {0.005, 0.005, 0.005}), "pose"),
+            {"body.position", "body.orientation"});
+  TypeParam filter = MakeFilter<TypeParam>(problem);
+  Frame frame = FrameAt(0.0, {});
+  frame.measurements.push_back({0, 0, -1, {0, 0, 0, std::cos(0.5), 0, 0, std::sin(0.5)}, {}});
+  for (int k = 0; k < 30; ++k) filter.Process(frame);
+  EXPECT_EQ(filter.Process(frame).measurements()[0].outcome, Outcome::kAccepted);
+  const double* const q = filter.state().value(problem.layout.Find("body.orientation"));
+  EXPECT_NEAR(q[0], std::cos(0.5), 1e-4);
+  EXPECT_NEAR(q[3], std::sin(0.5), 1e-4);
 }
 
 /// Motion model x' = x + w for each of the two blocks. The noises of the two blocks are
@@ -417,7 +540,8 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyOfFixedBlocksInflatesNothing) {
     return report.events.empty() ? "" : report.events.back().text;
   };
   const std::string why = "sensor 'disparity' was rejected 20 times in a row: ";
-  EXPECT_EQ(event_of(BlockStatus::kEstimated), why + "the covariance of its blocks was inflated");
+  EXPECT_EQ(event_of(BlockStatus::kEstimated),
+            why + "the sigmas of its blocks were multiplied by 10");
   EXPECT_EQ(event_of(BlockStatus::kConstant), why + "the sensor has no estimated block to inflate");
   EXPECT_EQ(event_of(BlockStatus::kConsider), why + "the sensor has no estimated block to inflate");
 }
@@ -460,7 +584,7 @@ struct WithOptional : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-TEST(Ekf, ASensorThatIsRejectedRepeatedlyWhoseRoleIsUnboundInflatesWhatItCorrects) {
+TEST(Ekf, ASensorThatIsRejectedRepeatedlyWhoseRoleIsUnboundWidensItsOtherBlock) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
   AddSensor(problem, "s", MakeSensor(WithOptional(), "with_optional"), {"p.x"});
@@ -471,9 +595,11 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyWhoseRoleIsUnboundInflatesWhatItCorrect
   UpdateReport report;
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 100.0}}));
   ASSERT_FALSE(report.events.empty());
-  EXPECT_EQ(report.events.back().text,
-            "sensor 's' was rejected 20 times in a row: the covariance of its blocks was inflated");
-  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 100.0, 1e-12);
+  EXPECT_EQ(
+      report.events.back().text,
+      "sensor 's' was rejected 20 times in a row: the sigma of block 'p.x', which explains the "
+      "rejections best, was increased by the required correction of 100");
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 1.0 + 100.0 * 100.0, 1e-9);
 }
 
 TEST(Ekf, ThatASensorLeftItsDomainIsNotedAlsoAfterAGatedMeasurement) {

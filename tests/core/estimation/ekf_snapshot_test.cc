@@ -31,15 +31,19 @@ Ekf OneBlock(double sigma) {
 }
 
 TEST(EkfSnapshot, AWarningThatIsGivenOnceIsGivenAgainOnlyFromBeforeIt) {
-  Ekf ekf = OneBlock(1e-9);
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddMotion(problem, "q", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(problem, "z", SumSensor(1.0, 1.0, 1e-9), {"p.x", "q.x"});
+  Ekf ekf(problem, EkfOptions{}, {{"z", 1}});
   const Ekf before = ekf;
-  EXPECT_TRUE(testing::HasEvent(ekf.Process(FrameAt(0.0, {{0, 1.0}})), EventKind::kConditioning));
+  EXPECT_TRUE(testing::HasEvent(ekf.Process(FrameAt(0.0, {{0, 1.0}})), EventKind::kDigitsLost));
   const Ekf after = ekf;
   ekf = before;
-  EXPECT_TRUE(testing::HasEvent(ekf.Process(FrameAt(0.0, {{0, 1.0}})), EventKind::kConditioning));
+  EXPECT_TRUE(testing::HasEvent(ekf.Process(FrameAt(0.0, {{0, 1.0}})), EventKind::kDigitsLost));
   ekf = before;
   ekf = after;
-  EXPECT_FALSE(testing::HasEvent(ekf.Process(FrameAt(0.5, {{0, 1.0}})), EventKind::kConditioning));
+  EXPECT_FALSE(testing::HasEvent(ekf.Process(FrameAt(0.5, {{0, 1.0}})), EventKind::kDigitsLost));
 }
 
 TEST(EkfSnapshot, AFailureTellsTheLastMeasurementOfThePastThatCounts) {

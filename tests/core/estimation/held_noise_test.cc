@@ -116,8 +116,8 @@ class HeldNoise : public ::testing::Test {
                                 const Options& options = {}) {
     return StatesOf(*Make<Filter>(problem, options, StreamsOf(problem)), frames);
   }
-  /// Tolerance for rounding errors. With sigma points, rounding errors grow with eps / alpha^2, and
-  /// alpha is 0.01. In the smoother they grow with P / P_s, which is up to 1e4 here.
+  /// Tolerance for rounding errors. With sigma points, rounding errors grow with eps / alpha^2. In
+  /// the smoother they grow with P / P_s, which is up to 1e4 here.
   static constexpr bool kCancels =
       std::is_same_v<Filter, Ukf> || std::is_same_v<Filter, RtsSmoother>;
   static constexpr double kTolerance = kCancels ? 1e-9 : 1e-11;

@@ -14,23 +14,6 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// Measures z = a x + b y + n.
-struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
-  static constexpr std::array kRoles{Quantity{"x"}, Quantity{"y"}};
-  static constexpr Quantity kMeasurement{"z"};
-  double a, b, sigma;
-  Sum(double first, double second, double s) : a(first), b(second), sigma(s) {}
-  template <class T>
-  bool Predict(const T* x, const T* y, T* z) const {
-    z[0] = a * x[0] + b * y[0];
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, const T*, T* l) const {
-    l[0] = T(sigma);
-  }
-};
-
 /// Kalman filter of MovingPoint(0.7) with one direct measurement, computed with the inverse of S.
 struct DirectTextbook {
   Eigen::Vector2d x{1.0, -0.5};
@@ -108,8 +91,8 @@ TEST(SquareRootEkf, StaysPositiveDefiniteWhereTheDifferenceOfCovariancesDoesNot)
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, kPrior}});
   AddMotion(problem, "q", testing::ConstantMotion(1), {{"x", 0.0, kPrior}});
-  AddSensor(problem, "sum", MakeSensor(Sum(1.0, 1.0, kSigma), "sum"), {"p.x", "q.x"});
-  AddSensor(problem, "nearly", MakeSensor(Sum(1.0, 1.001, kSigma), "sum"), {"p.x", "q.x"});
+  AddSensor(problem, "sum", SumSensor(1.0, 1.0, kSigma), {"p.x", "q.x"});
+  AddSensor(problem, "nearly", SumSensor(1.0, 1.001, kSigma), {"p.x", "q.x"});
   SquareRootEkf filter(problem, {}, StreamsOf(problem));
 
   const Eigen::RowVector2d sum(1.0, 1.0), nearly(1.0, 1.001);

@@ -89,7 +89,9 @@ TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
   for (const double x : {0.05, 9e-4, 1e-4, 2e-5}) {
     const Problem problem = NearZero(x);
     Ekf ekf(problem, {}, StreamsOf(problem));
-    Ukf ukf(problem, {}, StreamsOf(problem));
+    UkfOptions options;
+    options.alpha = 0.01;
+    Ukf ukf(problem, options, StreamsOf(problem));
     const Frame frame = FrameAt(0.0, {{0, 5.02}});
     const UpdateReport &expected = ekf.Process(frame), &found = ukf.Process(frame);
     EXPECT_EQ(HasEvent(found, EventKind::kGuarded), x < 1e-3) << x;
@@ -107,7 +109,9 @@ TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
 TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
   for (const double x : {1e-7, 3e-10}) {
     const Problem problem = NearZero(x);
-    Ukf ukf(problem, {}, StreamsOf(problem));
+    UkfOptions options;
+    options.alpha = 0.01;
+    Ukf ukf(problem, options, StreamsOf(problem));
     const UpdateReport& report = ukf.Process(FrameAt(0.0, {{0, 5.02}}));
     EXPECT_EQ(report.measurements()[0].outcome, Outcome::kOutOfDomain);
     EXPECT_TRUE(report.measurements()[0].h.empty());

@@ -91,6 +91,58 @@ TEST(Ukf, GetsTheMomentsOfASquareExactly) {
   EXPECT_NEAR(CovarianceOf(ukf.state(), "p.x", "p.x"), v - k * k * s, 1e-13);
 }
 
+/// Measures the distance of a point of the plane from a beacon at the origin.
+struct Range : Sensor<Vec<1>, Vec<2>> {
+  static constexpr std::array kRoles{Quantity{"p", "m", "", "x,y"}};
+  static constexpr Quantity kMeasurement{"range", "m"};
+  template <class T>
+  bool Predict(const T* p, T* z) const {
+    using std::sqrt;
+    z[0] = sqrt(p[0] * p[0] + p[1] * p[1]);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.1);
+  }
+};
+
+/// Returns a problem with a point at (distance, 0) +- 1 m, and the sensor Range.
+Problem PointNearBeacon(double distance) {
+  Problem problem;
+  MotionBinding binding{"p", testing::ConstantMotion(2), {}};
+  binding.blocks.push_back(problem.layout.Declare("p.x", "p", binding.model->blocks()[0]));
+  problem.priors.push_back({0, {distance, 0.0}, Eigen::Matrix2d::Identity(), ""});
+  problem.motions.push_back(binding);
+  AddSensor(problem, "range", MakeSensor(Range{}, "range"), {"p.x"});
+  return problem;
+}
+
+// At distance d from the beacon, the mean range is 1.25 m, its variance 0.43 m^2. The curvature of
+// h at the estimate is 1 / d, which is far above the curvature at most points of the prior. The
+// predicted mean is at most sqrt(N) / alpha = 3.54 m.
+TEST(Ukf, ReportsOnceThatABeaconIsTooNear) {
+  for (const double distance : {0.001, 0.1}) {
+    const Problem problem = PointNearBeacon(distance);
+    Ukf ukf(problem, {}, StreamsOf(problem));
+    const UpdateReport first = ukf.Process(FrameAt(0.0, {{0, 1.25}}));
+    const MeasurementReport& entry = first.measurements()[0];
+    EXPECT_EQ(entry.outcome, Outcome::kAccepted);
+    EXPECT_LT(entry.h[0], 3.6);
+    EXPECT_LT(entry.nis, 1.0);
+    ASSERT_EQ(first.events.size(), 1u);
+    EXPECT_EQ(first.events[0].kind, EventKind::kNonlinear);
+    EXPECT_NE(first.events[0].text.find("sensor 'range'"), std::string::npos);
+    EXPECT_TRUE(ukf.Process(FrameAt(0.0, {{0, 1.25}})).events.empty());
+  }
+}
+
+TEST(Ukf, DoesNotReportABeaconThatIsFarEnough) {
+  const Problem problem = PointNearBeacon(3.0);
+  Ukf ukf(problem, {}, StreamsOf(problem));
+  EXPECT_TRUE(ukf.Process(FrameAt(0.0, {{0, 3.0}})).events.empty());
+}
+
 /// Motion model of an orientation that rotates by a random w ~ N(0, sigma^2 I) in each step: q' = q
 /// Exp(w).
 struct TurningOrientation : Motion<3, UnitQuaternion> {

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "alidade/evaluate/report.h"
+#include "alidade/io/text_cell.h"
 #include "command.h"
 #include "console.h"
 
@@ -20,10 +22,10 @@ constexpr const char* kEvalFooter = R"(Examples:
   alidade eval KITTI_00_gt.txt KITTI_00_orb.txt -a -d 100 -u m --all-pairs
   alidade eval truth.tum a.tum b.tum -a --markdown
 
-Formats of files: TUM (8 columns, or 20 with covariances), KITTI (12 columns, and times.txt) and
-EuRoC (csv). A folder can be a run, an estimator of a run, or an EuRoC sequence. Warnings are
-printed on standard error. Options have the names that evo uses. Underscores, as in --t_max_diff,
-are also accepted.)";
+Files: TUM (8 columns, or 20 with covariances), KITTI (12, and times.txt), EuRoC (csv, also of
+VINS-Mono and Kimera). A folder is a run, an estimator of a run, or an EuRoC sequence. Warnings are
+printed on standard error.
+Options have the names of evo; underscores, as in --t_max_diff, are accepted.)";
 
 enum class OutputFormat { kText, kJson, kMarkdown, kLatex };
 
@@ -31,9 +33,11 @@ struct EvalArguments {
   std::string reference;
   std::vector<std::string> estimates;
   TrajectoryFormat format = TrajectoryFormat::kDetect;
+  bool skip_nan = false;
   EvaluateOptions options;
   bool se3 = false, scale = false, origin = false;
   double max_diff_s = 0.01, offset_s = 0.0;
+  std::string start_s, end_s;  ///< texts, because a double is not exact to the ns
   OutputFormat output_format = OutputFormat::kText;
 };
 
@@ -66,9 +70,14 @@ void LogWarnings(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) Log(LogLevel::kWarning, warning);
 }
 
+Trajectory ReadFile(const TrajectoryFile& file, const EvalArguments& arguments) {
+  return ReadTrajectory(file.file, arguments.format,
+                        arguments.skip_nan ? NonFiniteRows::kSkip : NonFiniteRows::kRefuse);
+}
+
 Evaluation EvaluateFile(const Trajectory& reference, const TrajectoryFile& file,
-                        const EvaluateOptions& options, TrajectoryFormat format) {
-  const Trajectory estimate = ReadTrajectory(file.file, format);
+                        const EvaluateOptions& options, const EvalArguments& arguments) {
+  const Trajectory estimate = ReadFile(file, arguments);
   Evaluation evaluation = Evaluate(reference, estimate, options);
   evaluation.label = file.label;
   evaluation.warnings.insert(evaluation.warnings.begin(), estimate.warnings.begin(),
@@ -128,6 +137,13 @@ std::vector<TrajectoryFile> FilesOf(const EvalArguments& arguments) {
   return files;
 }
 
+/// Returns the timestamp of an option, or nullopt if the option is not used.
+std::optional<Timestamp> TimeOf(const std::string& text) {
+  double t_s = 0.0;
+  if (cell::ParseNumber(text, t_s) != nullptr) return std::nullopt;
+  return cell::ParseTimestamp(text, t_s, 9);
+}
+
 /// Evaluates all estimates. If one of several fails, the others are still evaluated, and the exit
 /// code is that of the first failure.
 ExitCode RunEval(const EvalArguments& arguments) {
@@ -135,16 +151,17 @@ ExitCode RunEval(const EvalArguments& arguments) {
   options.alignment = SelectedAlignment(arguments);
   options.max_diff = TimestampFromSeconds(arguments.max_diff_s);
   options.offset = TimestampFromSeconds(arguments.offset_s);
+  options.range = {TimeOf(arguments.start_s), TimeOf(arguments.end_s)};
   const TrajectoryFile truth =
       IsSingleRun(arguments) ? TruthOf(arguments.reference) : ReferenceAt(arguments.reference);
   const std::vector<TrajectoryFile> files = FilesOf(arguments);
-  const Trajectory reference = ReadTrajectory(truth.file, arguments.format);
+  const Trajectory reference = ReadFile(truth, arguments);
   LogWarnings(reference.warnings);
   std::vector<Evaluation> evaluations;
   ExitCode code = ExitCode::kOk;
   for (const TrajectoryFile& file : files) {
     try {
-      evaluations.push_back(EvaluateFile(reference, file, options, arguments.format));
+      evaluations.push_back(EvaluateFile(reference, file, options, arguments));
       std::vector<std::string>& warnings = evaluations.back().warnings;
       LogWarnings(warnings);
       warnings.insert(warnings.begin(), reference.warnings.begin(), reference.warnings.end());
@@ -165,6 +182,11 @@ void CheckCombinations(const EvalArguments& arguments) {
   const PairOptions& pairs = arguments.options.pairs;
   if (pairs.unit == DeltaUnit::kFrames && pairs.delta != std::floor(pairs.delta)) {
     throw CLI::ValidationError("--delta: a number of frames must be whole; expected an integer");
+  }
+  const auto start = TimeOf(arguments.start_s), end = TimeOf(arguments.end_s);
+  if (start && end && *start > *end) {
+    throw CLI::ValidationError("--t-start: '" + arguments.start_s + "' is after --t-end, '" +
+                               arguments.end_s + "'; expected an earlier time");
   }
   const Alignment alignment = SelectedAlignment(arguments);
   if (arguments.options.align_poses > 0 &&
@@ -226,6 +248,27 @@ void AddErrors(CLI::App& command, EvalArguments& a) {
       ->check(IsNumber(0.0, 1.0));
 }
 
+/// Adds the options that select poses, and the plane of the poses.
+void AddSelection(CLI::App& command, EvalArguments& a) {
+  command.add_option("--t-start", a.start_s, "first timestamp of the reference that is used")
+      ->option_text("S")
+      ->check(IsNumber(-9e9, 9e9));
+  command.add_option("--t-end", a.end_s, "last timestamp of the reference that is used")
+      ->option_text("S")
+      ->check(IsNumber(-9e9, 9e9));
+  command
+      .add_option("--downsample", a.options.downsample,
+                  "use only N poses of each file, equally spaced by index, before matching")
+      ->option_text("N")
+      ->check(IsInteger(1, 1'000'000'000));
+  command
+      .add_option("--project-to-plane", a.options.plane,
+                  "project the poses to the plane xy, xz or yz, after the alignment")
+      ->option_text("PLANE")
+      ->transform(OneOf({Plane::kXy, Plane::kXz, Plane::kYz}));
+  command.add_flag("--skip-nan", a.skip_nan, "leave out rows with nan or inf, such as lost frames");
+}
+
 void AddTimes(CLI::App& command, EvalArguments& a) {
   command
       .add_option("--t-max-diff", a.max_diff_s,
@@ -274,6 +317,7 @@ void AddEval(CLI::App& program, Action& action) {
   AddAlignment(command, *arguments);
   AddErrors(command, *arguments);
   AddTimes(command, *arguments);
+  AddSelection(command, *arguments);
   AddOutputFormats(command, *arguments);
   command.footer(kEvalFooter);
   command.callback([&action, arguments] {

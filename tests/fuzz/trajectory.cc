@@ -18,6 +18,8 @@ EvaluateOptions OptionsOf(unsigned bits) {
   options.pairs.all = (bits >> 8 & 1) != 0;
   options.max_diff = (bits >> 9 & 1) != 0 ? 10'000'000 : 1'000'000'000'000;
   options.offset = (bits >> 10 & 1) != 0 ? 0 : -1'000'000'000;
+  options.plane = static_cast<Plane>(bits >> 13 & 3);
+  options.downsample = (bits >> 15 & 1) != 0 ? 3 : 0;
   for (int relation = 0; relation < 6; ++relation) {
     if (relation != 0 && relation != 2)
       options.relations.push_back(static_cast<PoseRelation>(relation));
@@ -33,7 +35,8 @@ void Read(unsigned bits, const std::vector<std::string>& parts) {
   for (std::size_t i = 1; i < reference.timestamps.size(); ++i) {
     Require(reference.timestamps[i - 1] <= reference.timestamps[i], "timestamps do not ascend");
   }
-  const Trajectory estimate = ReadTrajectory(second.path());
+  const Trajectory estimate =
+      ReadTrajectory(second.path(), TrajectoryFormat::kDetect, NonFiniteRows::kSkip);
   const Evaluation evaluation = Evaluate(reference, estimate, OptionsOf(bits));
   Require(evaluation.estimate.size() == evaluation.reference.size(), "a pose has no partner");
 }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "alidade/base/error.h"
+#include "alidade/io/near_file.h"
 
 namespace alidade {
 
@@ -34,7 +35,8 @@ class LineReader {
       : is_standard_input_(path == "-"), name_(is_standard_input_ ? "<stdin>" : path.string()) {
     const auto fail = [&](const char* reason) {
       const std::string problem = "cannot read '" + name_ + "': " + reason;
-      throw Error(ExitCode::kInputMissing, ErrorLine(place, key, problem, "a readable file"));
+      throw Error(ExitCode::kInputMissing,
+                  ErrorLine(place, key, problem, "a readable file", internal::NearFile(path)));
     };
     descriptor_ = is_standard_input_ ? STDIN_FILENO : open(path.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor_ < 0 && errno == EINTR) FailStopped();

@@ -25,8 +25,8 @@ class NumberRows {
  public:
   static constexpr char kCommaOrBlanks = '\0';
 
-  /// The separator ' ' means one or more blanks. The separator kCommaOrBlanks means commas in a row
-  /// that contains a comma, and blanks in any other row.
+  /// The separator ' ' means any number of blanks. kCommaOrBlanks means commas in a row that
+  /// contains a comma, and blanks in any other row. A comma at the end of such a row is ignored.
   NumberRows(const std::filesystem::path& path, const Place& place, const std::string& key,
              char separator = ',')
       : reader_(path, place, key), separator_(separator) {
@@ -114,6 +114,7 @@ class NumberRows {
         cells_.push_back(remaining.substr(0, end));
         if (end == remaining.size()) return;
         remaining.remove_prefix(end + 1);
+        if (separator_ == kCommaOrBlanks && cell::Trim(remaining).empty()) return;
       }
     }
     for (std::size_t start = line_.find_first_not_of(" \t"); start < line_.size();) {

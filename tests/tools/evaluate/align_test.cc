@@ -244,6 +244,48 @@ TEST(Associate, WithoutTimestampsByRow) {
             "NAME_times.txt next to NAME.txt)");
 }
 
+TEST(Associate, ByRowLeavesOutARowThatEitherFileHasLost) {
+  Trajectory reference = Curve(5).Select({0, 1, 2, 4}), estimate = Curve(5).Select({1, 3, 4});
+  reference.timestamps.clear();
+  estimate.timestamps.clear();
+  const Matches matches = Associate(reference, estimate, 0, 0);  // rows 1 and 4
+  EXPECT_EQ(matches.reference, (std::vector<int>{1, 3}));
+  EXPECT_EQ(matches.estimate, (std::vector<int>{0, 2}));
+  EXPECT_EQ(matches.possible, 3);
+  EXPECT_THROW(Associate(reference.Select({0}), estimate.Select({1}), 0, 0), Error);
+}
+
+TEST(Associate, NumbersOfFramesAreNamedIfNoTimesMatch) {
+  const Trajectory numbered = At({0.0, 1.0, 2.0, 3.0}), timed = At({9.05, 9.1, 9.15});
+  for (const auto& [reference, estimate] : {std::pair{timed, numbered}, {numbered, timed}}) {
+    try {
+      Associate(reference, estimate, 10'000'000, 0);
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what())
+                    .find("; expected the time of each frame, from the list of its images, because "
+                          "the timestamps of curve.tum are probably numbers of frames; or "
+                          "timestamps of the same clock"),
+                std::string::npos)
+          << error.what();
+    }
+  }
+}
+
+TEST(Associate, WholeSecondsSince1970AreNotNumbersOfFrames) {
+  const double now = 1.4e9;
+  for (const double step : {0.0, 1.0}) {
+    try {
+      Associate(At({now + 9.05, now + 9.1, now + 9.15}), At({now, now + step, now + 2.0 * step}),
+                10'000'000, 0);
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_EQ(std::string(error.what()).find("numbers of frames"), std::string::npos)
+          << error.what();
+    }
+  }
+}
+
 TEST(Associate, KittiWithTimesBesideBothGoesByThem) {
   Trajectory reference = At({0.0, 0.1, 0.2, 0.3}), estimate = At({0.1, 0.3});
   reference.format = estimate.format = TrajectoryFormat::kKitti;

@@ -138,6 +138,104 @@ TEST(PairsOf, AreDeltaApartInEachUnit) {
   EXPECT_EQ(PairsOf(t, {0.91, DeltaUnit::kRadians, true, 0.05}), (Pairs{{0, 9}, {1, 10}}));
 }
 
+TEST(Crop, KeepsTheEndsOfTheRange) {
+  const Trajectory t = Curve(10);  // 100.0 s to 100.9 s
+  const Timestamp start = 100'200'000'000, end = 100'500'000'000;
+  EXPECT_EQ(Crop(t, {}).size(), 10);
+  EXPECT_EQ(Crop(t, {start, {}}).rows, (std::vector<int>{2, 3, 4, 5, 6, 7, 8, 9}));
+  EXPECT_EQ(Crop(t, {{}, end}).rows, (std::vector<int>{0, 1, 2, 3, 4, 5}));
+  EXPECT_EQ(Crop(t, {start, end}).rows, (std::vector<int>{2, 3, 4, 5}));
+  try {
+    Crop(t, {0, 1});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "curve.tum --t-start, --t-end: no pose is in this range of time; expected a part "
+                 "of 100.000000 s to 100.900000 s");
+  }
+  Trajectory bare = t;
+  bare.timestamps.clear();
+  EXPECT_THROW(Crop(bare, {start, {}}), Error);
+}
+
+TEST(Downsample, TakesIndicesAtEqualDistances) {
+  const Trajectory t = Curve(10);
+  EXPECT_EQ(Downsample(t, 0).size(), 10);
+  EXPECT_EQ(Downsample(t, 10).size(), 10);
+  EXPECT_EQ(Downsample(t, 11).size(), 10);
+  EXPECT_EQ(Downsample(t, 4).rows, (std::vector<int>{0, 3, 6, 9}));
+  EXPECT_EQ(Downsample(t, 3).rows, (std::vector<int>{0, 4, 9}));  // 4.5 is rounded down
+  EXPECT_EQ(Downsample(t, 1).rows, (std::vector<int>{0}));
+}
+
+/// The orientation is Rz(c) Ry(b) Rx(a) with a = 0.1, b = 0.2, c = 2.
+TEST(Project, KeepsThePositionInThePlaneAndTheRotationAboutItsNormal) {
+  using Eigen::AngleAxisd;
+  Trajectory t = Curve(1);
+  t.positions.col(0) = Vector3d(1, 2, 3);
+  t.orientations[0] = AngleAxisd(2.0, Vector3d::UnitZ()) * AngleAxisd(0.2, Vector3d::UnitY()) *
+                      AngleAxisd(0.1, Vector3d::UnitX());
+  struct Case {
+    Plane plane;
+    Vector3d position;
+    double angle;
+    Vector3d normal;
+  };
+  for (const Case& c : {Case{Plane::kXy, {1, 2, 0}, 2.0, Vector3d::UnitZ()},
+                        {Plane::kXz, {1, 0, 3}, 0.2, Vector3d::UnitY()},
+                        {Plane::kYz, {0, 2, 3}, 0.1, Vector3d::UnitX()}}) {
+    SCOPED_TRACE(ToString(c.plane));
+    const Trajectory projected = Project(t, c.plane);
+    EXPECT_EQ(projected.positions.col(0), c.position);
+    EXPECT_TRUE(projected.orientations[0].isApprox(
+        Eigen::Quaterniond(AngleAxisd(c.angle, c.normal)), 1e-14));
+  }
+  EXPECT_EQ(Project(t, Plane::kNone).positions.col(0), Vector3d(1, 2, 3));
+}
+
+TEST(Evaluate, ProjectsAfterTheAlignment) {
+  // The estimate is the reference rotated by 90 degrees about x. Its own projection would be wrong.
+  const Similarity rotation{1.0, Eigen::AngleAxisd(0.5 * kPi, Vector3d::UnitX()).toRotationMatrix(),
+                            Vector3d::Zero()};
+  EvaluateOptions options;
+  options.alignment = Alignment::kSe3;
+  options.plane = Plane::kXy;
+  const Evaluation e = Evaluate(Curve(30), rotation * Curve(30), options);
+  EXPECT_LT(e.absolute[0].statistics.max, 1e-12);
+  EXPECT_TRUE(e.reference.positions.row(2).isZero(0.0));
+  EXPECT_TRUE(e.estimate.positions.row(2).isZero(0.0));
+}
+
+TEST(Evaluate, CropsTheReferenceAndDownsamplesBoth) {
+  EvaluateOptions options;
+  options.range = {100'200'000'000, 100'500'000'000};
+  // Poses 2 to 5 of the reference are used. The second estimate ends at pose 4.
+  EXPECT_EQ(Evaluate(Curve(10), Curve(10), options).possible, 4);
+  const Evaluation cropped = Evaluate(Curve(10), Curve(5), options);
+  EXPECT_EQ(cropped.possible, 3);
+  EXPECT_EQ(cropped.estimate.rows, (std::vector<int>{2, 3, 4}));
+  EXPECT_TRUE(cropped.warnings.empty());
+  options = {};
+  options.downsample = 4;
+  const Evaluation sampled = Evaluate(Curve(10), Curve(10), options);
+  EXPECT_EQ(sampled.reference.rows, (std::vector<int>{0, 3, 6, 9}));
+  EXPECT_EQ(sampled.estimate.rows, sampled.reference.rows);
+}
+
+TEST(Evaluate, WithholdsTheNeesOfAProjection) {
+  Trajectory estimate = Curve(30);
+  estimate.position_covariances.assign(30, Eigen::Matrix3d::Identity());
+  estimate.orientation_covariances = estimate.position_covariances;
+  EvaluateOptions options;
+  options.plane = Plane::kXy;
+  const Evaluation e = Evaluate(Curve(30), estimate, options);
+  EXPECT_FALSE(e.position_nees);
+  EXPECT_EQ(e.nees_withheld,
+            "the projection to xy removes part of the error that the covariance describes; for the "
+            "NEES, omit "
+            "the projection");
+}
+
 TEST(PairsOf, RefusesADeltaThatNoTwoPosesAreApart) {
   EXPECT_THROW(PairsOf(Line(5, 0.5), {5.0, DeltaUnit::kFrames}), Error);
   EXPECT_THROW(PairsOf(Line(5, 0.5), {1.2, DeltaUnit::kMetres, true, 0.1}), Error);

@@ -20,10 +20,13 @@ class TrajectoryFiles : public ::testing::Test {
     std::ofstream(folder_ / name, std::ios::binary) << text;
   }
   /// Returns the trajectory read from a file with this text.
-  Trajectory Read(const std::string& text,
-                  TrajectoryFormat format = TrajectoryFormat::kDetect) const {
+  Trajectory Read(const std::string& text, TrajectoryFormat format = TrajectoryFormat::kDetect,
+                  NonFiniteRows non_finite = NonFiniteRows::kRefuse) const {
     Write("poses.txt", text);
-    return ReadTrajectory(folder_ / "poses.txt", format);
+    return ReadTrajectory(folder_ / "poses.txt", format, non_finite);
+  }
+  Trajectory ReadFinite(const std::string& text) const {
+    return Read(text, TrajectoryFormat::kDetect, NonFiniteRows::kSkip);
   }
   /// Returns the error message of Read without the path of the folder, or "" if there is no error.
   std::string Refusal(const std::string& text,
@@ -38,9 +41,10 @@ class TrajectoryFiles : public ::testing::Test {
   }
   /// Returns the warnings for a file with this text, one warning per line, without the path of the
   /// folder.
-  std::string WarningsOf(const std::string& text) const {
+  std::string WarningsOf(const std::string& text) const { return WarningsOf(Read(text)); }
+  std::string WarningsOf(const Trajectory& trajectory) const {
     std::string all;
-    for (const std::string& warning : Read(text).warnings) {
+    for (const std::string& warning : trajectory.warnings) {
       all += warning.substr(folder_.path().string().size() + 1) + '\n';
     }
     return all;
@@ -50,6 +54,9 @@ class TrajectoryFiles : public ::testing::Test {
 };
 
 using Eigen::Vector3d;
+
+/// End of an error message about a file whose format was detected.
+const std::string kReadAsTum = "; read as tum (8 columns); the alternative is --format euroc";
 
 TEST_F(TrajectoryFiles, TumIsReadExactlyWhateverTheLineEnds) {
   const Trajectory t = Read(
@@ -136,33 +143,152 @@ TEST_F(TrajectoryFiles, AGivenFormatOverridesTheRow) {
 TEST_F(TrajectoryFiles, RowsThatAreNoneAreRefusedWithTheirPlace) {
   const std::string good = "0 1 2 3 0 0 0 1\n";
   EXPECT_EQ(Refusal("1 2 3\n"),
-            "poses.txt:1: the row has 3 columns; expected 8 columns (TUM), 20 columns (TUM with "
-            "covariances), 12 columns (KITTI), or 8 or 17 columns separated by commas (EuRoC)");
-  EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0\n"),
+            "poses.txt:1: 3 columns; expected 8 columns (TUM), 20 (TUM with covariances), 12 "
+            "(KITTI), or with commas 8, 11 or 17 (EuRoC)");
+  const auto refusal_of_row = [&](const std::string& row) {
+    std::string text = Refusal(good + row);
+    EXPECT_TRUE(text.ends_with(kReadAsTum)) << text;
+    return text.substr(0, text.size() - kReadAsTum.size());
+  };
+  EXPECT_EQ(refusal_of_row("1 1 2 3 0 0 0\n"),
             "poses.txt:2:14: the row has 7 columns; expected 8, t x y z qx qy qz qw");
-  EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0"),
-            "poses.txt:2:14: the last line is cut short: it has 7 columns; expected 8, t x y z qx "
-            "qy qz qw");
-  EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0 1 5\n"),
+  EXPECT_EQ(
+      refusal_of_row("1 1 2 3 0 0 0"),
+      "poses.txt:2:14: the last line is cut short: it has 7 columns; expected 8, t x y z qx qy qz "
+      "qw");
+  EXPECT_EQ(refusal_of_row("1 1 2 3 0 0 0 1 5\n"),
             "poses.txt:2:17: the row has 9 columns; expected 8, t x y z qx qy qz qw");
-  EXPECT_EQ(Refusal(good + "1 1 nan 3 0 0 0 1\n"),
-            "poses.txt:2:5 y: 'nan' is not finite; expected a finite number");
-  EXPECT_EQ(Refusal(good + "1 1 -1e300 3 0 0 0 1\n"),
+  EXPECT_EQ(refusal_of_row("1 1 nan 3 0 0 0 1\n"),
+            "poses.txt:2:5 y: 'nan' is not finite; expected a finite number, or --skip-nan to "
+            "leave out such rows");
+  EXPECT_EQ(refusal_of_row("1 1 -1e300 3 0 0 0 1\n"),
             "poses.txt:2: a coordinate is beyond 1e15 m; expected a position in metres");
-  EXPECT_EQ(Refusal(good + "1 1 2.x 3 0 0 0 1\n"),
+  EXPECT_EQ(refusal_of_row("1 1 2.x 3 0 0 0 1\n"),
             "poses.txt:2:5 y: '2.x' is not a number; expected a finite number");
-  EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0 1.01\n"),
-            "poses.txt:2: the length of the quaternion is 1.010000; expected a length within "
-            "1e-3 of 1");
-  EXPECT_EQ(Refusal("1.5,1,2,3,1,0,0,0\n"),
-            "poses.txt:1:1 t: '1.5' is not a whole number; expected a whole number >= 0");
   const std::string no_rotation =
       "poses.txt:1: columns 1-3, 5-7, 9-11 are not a rotation matrix; expected R with R R' = 1 to "
-      "within 1e-3, and det R = 1";
+      "within 1e-3, and det R = 1; read as kitti (12 columns)";
   EXPECT_EQ(Refusal("1.1 0 0 0 0 1 0 0 0 0 1 0\n"), no_rotation);
   EXPECT_EQ(Refusal("-1 0 0 0 0 1 0 0 0 0 1 0\n"), no_rotation);
   EXPECT_EQ(Refusal("# nothing\n").substr(0, 40), "poses.txt:1: the file contains no poses;");
   EXPECT_THROW(ReadTrajectory(folder_ / "missing.txt"), Error);
+}
+
+TEST_F(TrajectoryFiles, OrbSlamWritesNanosecondsWithDecimals) {
+  const Trajectory t = Read(
+      "1403636579763555584.000000 0.1 0.2 0.3 0.6 0 0 0.8\n"
+      "1403636579813555456.000000 0.1 0.2 0.3 0.6 0 0 0.8\n");
+  EXPECT_EQ(t.timestamps, (std::vector<Timestamp>{1403636579763555584, 1403636579813555456}));
+  EXPECT_TRUE(t.orientations[0].isApprox(Eigen::Quaterniond(0.8, 0.6, 0, 0), 1e-15));
+}
+
+TEST_F(TrajectoryFiles, VinsWritesTheVelocityAndACommaAtTheEnd) {
+  const std::string pose = "1403636580838555648,4.6,-1.7,0.7,0.8,0.6,0,0";
+  for (const char* more : {",", ", ", ",0.1,0.2,0.3", ",0.1,0.2,0.3,", ",0.1,0.2,0.3, \t"}) {
+    SCOPED_TRACE(more);
+    const Trajectory t = Read(pose + more + "\n");
+    EXPECT_EQ(t.format, TrajectoryFormat::kEuroc);
+    EXPECT_EQ(t.timestamps[0], 1403636580838555648);
+    EXPECT_EQ(t.positions.col(0), Vector3d(4.6, -1.7, 0.7));
+    EXPECT_TRUE(t.orientations[0].isApprox(Eigen::Quaterniond(0.8, 0.6, 0, 0), 1e-15));
+  }
+  EXPECT_EQ(Refusal(pose + ",0.1,,\n").substr(0, 36), "poses.txt:1: 10 columns with commas;");
+}
+
+TEST_F(TrajectoryFiles, EightColumnsWithCommasAreTumIfTheTimeHasDecimals) {
+  const Trajectory t = Read("1403636580.05,1,2,3,0.6,0,0,0.8\n1403636581,1,2,3,0.6,0,0,0.8\n");
+  EXPECT_EQ(t.format, TrajectoryFormat::kTum);
+  EXPECT_EQ(t.timestamps[0], 1403636580050000000);
+  EXPECT_TRUE(t.orientations[0].isApprox(Eigen::Quaterniond(0.8, 0.6, 0, 0), 1e-15));
+  // The first time decides, and an error names the decision and its reason.
+  EXPECT_EQ(Refusal("1403636580,1,2,3,0.6,0,0,0.8\n1403636580.05,1,2,3,0.6,0,0,0.8\n"),
+            "poses.txt:2:1 t: '1403636580.05' is not a whole number; expected a whole number >= 0; "
+            "read as euroc (8 columns with commas, t is a whole number); the "
+            "alternative is --format tum");
+}
+
+TEST_F(TrajectoryFiles, AHeaderIsPassedOver) {
+  const std::string pose = "1403636580838555648,4.6,-1.7,0.7,0.8,0.6,0,0";
+  const Trajectory kimera = Read("timestamp,x,y,z,qw,qx,qy,qz,vx,vy,vz,bgx,bgy,bgz,bax,bay,baz\n" +
+                                 pose + ",0,0,0,0,0,0,0,0,0\n");
+  EXPECT_EQ(kimera.format, TrajectoryFormat::kEuroc);
+  EXPECT_EQ(kimera.size(), 1);
+  EXPECT_EQ(kimera.first_line, 2);
+  const std::string tum = "timestamp tx ty tz qx qy qz qw\n1.5 1 2 3 0.6 0 0 0.8\n";
+  for (const TrajectoryFormat format : {TrajectoryFormat::kDetect, TrajectoryFormat::kTum}) {
+    EXPECT_EQ(Read(tum, format).timestamps, std::vector<Timestamp>{1'500'000'000});
+  }
+  EXPECT_EQ(Refusal("t,x\nt,x\n").substr(0, 36), "poses.txt:2: 2 columns with commas; ")
+      << "only one row is a header";
+  EXPECT_NE(Refusal("1.5x 1 2 3 0 0 0 1\n"), "") << "a row with numbers is not a header";
+}
+
+TEST_F(TrajectoryFiles, AHeaderThatNamesTheOrderOfTheQuaternionDecides) {
+  const std::string pose = "1403636580838555648,4.6,-1.7,0.7,0.8,0.6,0,0\n";
+  const Trajectory w_last = Read("stamp,x,y,z,qx,qy,qz,qw\n" + pose);
+  EXPECT_EQ(w_last.format, TrajectoryFormat::kTum);
+  EXPECT_EQ(w_last.timestamps[0], 1403636580838555648);
+  EXPECT_TRUE(w_last.orientations[0].isApprox(Eigen::Quaterniond(0, 0.8, 0.6, 0), 1e-15));
+  EXPECT_EQ(
+      Read("stamp,p_x [m],p_y [m],p_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n" + pose).format,
+      TrajectoryFormat::kEuroc);
+  EXPECT_EQ(Refusal("t,x,y,z,qw,qx,qy,qz\n1.5,1,2,3,1,0,0,0\n"),
+            "poses.txt:2:1 t: '1.5' is not a whole number; expected a whole number >= 0; "
+            "read as euroc (8 columns with commas, qw first in the header); the alternative is "
+            "--format tum");
+  EXPECT_EQ(Refusal("t x y z qw qx qy qz\n1.5 1 2 3 1 0 0 0\n").substr(0, 54),
+            "poses.txt:2: 8 columns, qw first in the header; expect");
+}
+
+TEST_F(TrajectoryFiles, RowsOfLostFramesAreLeftOutOnRequest) {
+  const std::string text =
+      "1 1 0 0 0 0 0 1\n2 nan nan nan nan nan nan nan\n3 -inf 0 0 0 0 0 1\n4 4 0 0 0 0 0 1\n";
+  const Trajectory t = ReadFinite(text);
+  EXPECT_EQ(t.positions.row(0), Eigen::RowVector2d(1, 4));
+  EXPECT_EQ(t.timestamps, (std::vector<Timestamp>{1'000'000'000, 4'000'000'000}));
+  EXPECT_EQ(WarningsOf(t),
+            "poses.txt:2: 2 of 4 rows have a value that is not finite; they are left out\n");
+  EXPECT_EQ(WarningsOf(ReadFinite("1 1 0 0 0 0 0 1\n")), "");
+  // Other columns are not read, so their values do not matter.
+  EXPECT_EQ(Read("1403636580838555648,4.6,-1.7,0.7,0.8,0.6,0,0,nan,nan,nan\n").size(), 1);
+  try {
+    ReadFinite("1 nan 0 0 0 0 0 1\n");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what())
+                  .find("poses.txt:1: the file contains no poses: each of 1 rows has a value that "
+                        "is not finite"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
+TEST_F(TrajectoryFiles, ARowThatIsLeftOutKeepsItsTimeOfKitti) {
+  const std::string pose = "1 0 0 0 0 1 0 0 0 0 1 0\n";
+  const std::string lost = "nan nan nan nan nan nan nan nan nan nan nan nan\n";
+  Write("times.txt", "0\n1\n2\n");
+  const Trajectory t = ReadFinite(pose + lost + pose);
+  EXPECT_EQ(t.timestamps, (std::vector<Timestamp>{0, 2'000'000'000}));
+  EXPECT_EQ(t.rows, (std::vector<int>{0, 2}));
+  EXPECT_EQ(t.row_count, 3);
+  EXPECT_EQ(Refusal(lost),
+            "poses.txt:1:1 r11: 'nan' is not finite; expected a finite number, or --skip-nan to "
+            "leave out such rows; read as kitti (12 columns)");
+}
+
+TEST_F(TrajectoryFiles, QuaternionsOfTwoDecimalsAreNormalisedAndToldOf) {
+  const std::string text = "0 1 2 3 0 0 0 1\n1 1 2 3 0.58 0.58 0.58 0.01\n2 1 2 3 0 0.05 0 1\n";
+  const Trajectory t = Read(text);
+  EXPECT_DOUBLE_EQ(t.orientations[1].norm(), 1.0);
+  EXPECT_EQ(WarningsOf(t),
+            "poses.txt:2 qx: 2 of 3 quaternions have a length that differs from 1 by more than "
+            "1e-3; expected more decimals; they are normalised\n");
+  for (const auto& [row, length] : {std::pair{"0 1 2 3 0 0 0 1.02\n", "1.020000"},
+                                    {"0 1 2 3 0 0 0 0\n", "0.000000"},
+                                    {"0 1 2 3 0 0 0 2\n", "2.000000"}}) {
+    EXPECT_EQ(Refusal(row), std::string("poses.txt:1: quaternion of length ") + length +
+                                "; expected a length within 0.01 of 1" + kReadAsTum);
+  }
 }
 
 TEST_F(TrajectoryFiles, TimestampsThatCannotBeSecondsAreReadAsWhatTheyLookLike) {
@@ -198,7 +324,8 @@ TEST_F(TrajectoryFiles, TimestampsThatNoTimestampHoldsAreRefusedWithTheirPlace) 
   const std::string pose = " 1 2 3 0 0 0 1\n";
   const std::string two = "1" + pose + "2" + pose;
   const auto beyond = [](const std::string& timestamp) {
-    return "poses.txt:3 t: '" + timestamp + "' is beyond 292 years; expected seconds, as in TUM";
+    return "poses.txt:3 t: '" + timestamp + "' is beyond 292 years; expected seconds, as in TUM" +
+           kReadAsTum;
   };
   for (const std::string timestamp : {"99999999999999999999", "9223372036.854775808", "-9.3e9"}) {
     EXPECT_EQ(Refusal(two + timestamp + pose), beyond(timestamp));
@@ -206,9 +333,11 @@ TEST_F(TrajectoryFiles, TimestampsThatNoTimestampHoldsAreRefusedWithTheirPlace) 
   EXPECT_EQ(Refusal("9199999998" + pose + "9199999999" + pose + "9200000001" + pose),
             beyond("9200000001"));
   EXPECT_EQ(Refusal("9223372036854775807,1,2,3,1,0,0,0\n"),
-            "poses.txt:1:1 t: '9223372036854775807' is beyond 292 years; expected ns, as in EuRoC");
+            "poses.txt:1:1 t: '9223372036854775807' is beyond 292 years; expected ns, as in EuRoC; "
+            "read as euroc (8 columns with commas, t is a whole number); the alternative is "
+            "--format tum");
   EXPECT_EQ(Refusal("1e20" + pose),
-            "poses.txt:1 t: '1e20' is beyond 292 years; expected seconds, as in TUM");
+            "poses.txt:1 t: '1e20' is beyond 292 years; expected seconds, as in TUM" + kReadAsTum);
   EXPECT_EQ(Read("9199999998.123456789" + pose).timestamps[0], 9199999998123456789);
   // The difference of two timestamps must not overflow either.
   EXPECT_EQ(
@@ -223,17 +352,18 @@ TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
     return Refusal("0" + pose + good + ' ' + good + "\n1" + pose + orientation + ' ' + position +
                    '\n');
   };
+  const std::string tum = "; read as tum (20 columns)";
   const std::string none = " is not positive semi-definite: its smallest eigenvalue is -";
   EXPECT_EQ(refusal(good, "1 0 0 1 0 -1"), "poses.txt:2: the covariance of the position" + none +
-                                               "1; expected a positive semi-definite matrix");
+                                               "1; expected a positive semi-definite matrix" + tum);
   EXPECT_EQ(refusal("0.01 0.03 0 0.01 0 1", good),
             "poses.txt:2: the covariance of the orientation" + none +
-                "0.02; expected a positive semi-definite matrix");
+                "0.02; expected a positive semi-definite matrix" + tum);
   EXPECT_EQ(refusal("-1e-9 0 0 -1e-9 0 -1e-9", good),
             "poses.txt:2: the covariance of the orientation" + none +
-                "1e-09; expected a positive semi-definite matrix");
-  // A singular covariance is valid. A covariance that is negative only because it was rounded to
-  // six digits is also valid.
+                "1e-09; expected a positive semi-definite matrix" + tum);
+  // A singular covariance is valid. So is a covariance that is negative only because it was rounded
+  // to six digits.
   EXPECT_EQ(refusal("0 0 0 0 0 0", "1 1 0 1 0 0"), "");
   EXPECT_EQ(refusal(good, "0.111111 0.111112 0 0.111111 0 1"), "");
 }

@@ -86,6 +86,63 @@ TEST(EvaluationWarnings, FewMatchesAreTold) {
             "and rate, or the options --t-offset and --t-max-diff\n");
 }
 
+TEST(EvaluationWarnings, NumbersOfFramesAreToldWithTheirFile) {
+  // The reference has 10 poses per second, so that only each tenth of its poses has a partner.
+  Trajectory estimate = Estimate(Curve(60));
+  for (std::size_t i = 0; i < 60; ++i) {
+    estimate.timestamps[i] = 100'000'000'000 + 1'000'000'000 * static_cast<Timestamp>(i);
+  }
+  const std::string warnings = WarningsOf(Curve(60), estimate);
+  EXPECT_NE(warnings.find("estimate.tum:1 t: 6 of 60 possible poses match: the timestamps are "
+                          "probably numbers of frames; expected the time of each frame, from the "
+                          "list of its images\n"),
+            std::string::npos)
+      << warnings;
+  // Times in whole seconds that match are times.
+  EXPECT_EQ(WarningsOf(Curve(60), Estimate(Curve(60).Select({0, 10, 20, 30, 40, 50}))), "");
+}
+
+TEST(EvaluationWarnings, MotionlessPosesDetermineNoAlignment) {
+  Trajectory reference = testing::Line(60, 0.0), estimate = Estimate(testing::Line(60, 0.0));
+  for (const char* spread : {"0 m", "0.00123 m"}) {  // exactly motionless, and except for noise
+    SCOPED_TRACE(spread);
+    for (const Alignment alignment : {Alignment::kYaw, Alignment::kSe3}) {
+      EXPECT_EQ(
+          WarningsOf(reference, estimate, Aligned(alignment)),
+          std::string("estimate.tum: the rotation of ") + ToString(alignment) +
+              " is undetermined: the positions of 60 poses are uncorrelated, with a spread of "
+              "0.0121 m in the estimate and " +
+              spread +
+              " in the reference; expected poses that move, --align-origin or no "
+              "alignment\n");
+    }
+    EXPECT_EQ(WarningsOf(reference, estimate, Aligned(Alignment::kNone)), "");
+    EXPECT_EQ(WarningsOf(reference, estimate, Aligned(Alignment::kOrigin)), "");
+    for (int i = 0; i < 60; ++i) {
+      reference.positions.col(i) =
+          1e-3 * Vector3d(std::sin(11.0 * i), std::cos(13.0 * i), std::sin(17.0 * i));
+    }
+  }
+  EXPECT_TRUE(
+      WarningsOf(reference, estimate, Aligned(Alignment::kSim3))
+          .starts_with("estimate.tum: the rotation and the scale of sim3 are undetermined"));
+  EXPECT_TRUE(WarningsOf(reference, estimate, Aligned(Alignment::kScale))
+                  .starts_with("estimate.tum: the scale is undetermined"));
+}
+
+TEST(EvaluationWarnings, TheFirstPosesAtRestDetermineNoAlignment) {
+  Trajectory reference = Curve(60);
+  for (int i = 0; i < 20; ++i) reference.positions.col(i) = reference.positions.col(20);
+  EvaluateOptions options = Aligned(Alignment::kSe3);
+  EXPECT_EQ(WarningsOf(reference, Estimate(reference), options), "");
+  options.align_poses = 20;
+  const std::string warnings = WarningsOf(reference, Estimate(reference), options);
+  EXPECT_TRUE(
+      warnings.starts_with("estimate.tum: the rotation of se3 is undetermined: the "
+                           "positions of 20 poses are uncorrelated"))
+      << warnings;
+}
+
 TEST(EvaluationWarnings, AConstantTimeOffsetIsToldWithTheOptionThatTakesIt) {
   Trajectory estimate = Estimate(Curve(60));
   for (Timestamp& timestamp : estimate.timestamps) timestamp += 8'000'000;

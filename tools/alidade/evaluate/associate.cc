@@ -5,6 +5,7 @@
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "alidade/evaluate/evaluate.h"
+#include "alidade/evaluate/warnings.h"
 #include "alidade/io/text_cell.h"
 
 namespace alidade {
@@ -43,17 +44,26 @@ int NearestIndex(const std::vector<Timestamp>& timestamps, Timestamp time) {
 Matches MatchByRow(const Trajectory& reference, const Trajectory& estimate) {
   Matches matches;
   matches.by_row = true;
-  matches.possible = reference.size();
-  for (int i = 0; i < reference.size(); ++i) matches.reference.push_back(i);
-  matches.estimate = matches.reference;
-  if (reference.size() == estimate.size()) return matches;
+  matches.possible = std::min(reference.size(), estimate.size());
+  for (int i = 0; i < estimate.size(); ++i) {
+    const int row = estimate.rows[static_cast<std::size_t>(i)];
+    const auto same = std::ranges::lower_bound(reference.rows, row);
+    if (same == reference.rows.end() || *same != row) continue;
+    matches.reference.push_back(static_cast<int>(same - reference.rows.begin()));
+    matches.estimate.push_back(i);
+  }
+  if (reference.row_count == estimate.row_count) {
+    if (!matches.estimate.empty()) return matches;
+    FailMatching(estimate.name, "has no row in common with " + reference.name,
+                 "poses in the same rows");
+  }
   const bool reference_is_untimed = estimate.has_timestamps();
   const Trajectory& untimed = reference_is_untimed ? reference : estimate;
   const Trajectory& counterpart = reference_is_untimed ? estimate : reference;
   FailMatching(untimed.name,
-               "the file has " + std::to_string(untimed.size()) +
+               "the file has " + std::to_string(untimed.row_count) +
                    " poses without timestamps, but " + counterpart.name + " has " +
-                   std::to_string(counterpart.size()) + " poses",
+                   std::to_string(counterpart.row_count) + " poses",
                std::string("a row for each row of the ") +
                    (reference_is_untimed ? "estimate" : "reference") +
                    ", or timestamps for both files (KITTI: NAME_times.txt next to NAME.txt)");
@@ -109,8 +119,9 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Times
           reference.name + ": the timestamps are from " + Span(estimate) +
           (offset == 0 ? "" : " plus --t-offset") + ", those of the reference from " +
           Span(reference),
-      "timestamps of the same clock; or --t-offset, which is added to the timestamps of the "
-      "estimate; or a larger --t-max-diff");
+      internal::FrameNumberRemedy(reference, estimate) +
+          "timestamps of the same clock; or --t-offset, which is added to the timestamps of the "
+          "estimate; or a larger --t-max-diff");
 }
 
 }  // namespace alidade

@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+constexpr double kHalfTurn = 3.14159265358979323846;
 
 double AngleOf(const Eigen::Quaterniond& q) {
   return 2.0 * std::atan2(q.vec().norm(), std::abs(q.w()));
@@ -32,7 +32,7 @@ double ErrorOf(PoseRelation relation, const ErrorPose& e) {
     case PoseRelation::kRotation:
       return std::sqrt(8.0) * std::sin(0.5 * e.angle);
     case PoseRelation::kAngleDeg:
-      return e.angle * 180.0 / kPi;
+      return e.angle * 180.0 / kHalfTurn;
     case PoseRelation::kAngleRad:
       return e.angle;
     case PoseRelation::kFull:
@@ -177,7 +177,7 @@ Pairs PairsOf(const Trajectory& estimate, const PairOptions& options) {
   }
   const bool degrees = options.unit == DeltaUnit::kDegrees;
   const bool angles = degrees || options.unit == DeltaUnit::kRadians;
-  double delta = degrees ? options.delta * kPi / 180.0 : options.delta;
+  double delta = degrees ? options.delta * kHalfTurn / 180.0 : options.delta;
   if (options.unit == DeltaUnit::kSeconds) delta = std::round(1e9 * delta);
   const double tolerance = options.unit == DeltaUnit::kFrames ? 0.0 : options.tolerance * delta;
   Pairs pairs;

@@ -60,9 +60,21 @@ Eigen::Matrix3Xd OrientationErrors(const Trajectory& reference, const Trajectory
   return errors;
 }
 
+/// Adds the NEES of the estimate, which is neither aligned nor projected yet.
 void AddNees(Evaluation& evaluation) {
   const Trajectory& estimate = evaluation.estimate;
   if (!estimate.has_covariances()) return;
+  const EvaluateOptions& options = evaluation.options;
+  if (options.alignment != Alignment::kNone || options.plane != Plane::kNone) {
+    const bool is_aligned = options.alignment != Alignment::kNone;
+    evaluation.nees_withheld = is_aligned
+                                   ? std::string("the alignment by ") + ToString(options.alignment)
+                                   : std::string("the projection to ") + ToString(options.plane);
+    evaluation.nees_withheld +=
+        " removes part of the error that the covariance describes; for the NEES, omit the ";
+    evaluation.nees_withheld += is_aligned ? "alignment" : "projection";
+    return;
+  }
   const auto add = [&](const char* quantity, const Nees& nees, std::optional<Nees>& result) {
     if (nees.poses > 0) {
       result = nees;
@@ -99,11 +111,26 @@ std::optional<double> ScaleDrift(const Trajectory& reference, const Trajectory& 
   return *second / *first - 1.0;
 }
 
+/// Returns the number of poses of the estimate that can match the range of the reference.
+int PosesNear(const EvaluateOptions& options, const Trajectory& estimate) {
+  if (options.range.is_unlimited() || !estimate.has_timestamps()) return estimate.size();
+  const double margin_s = Seconds(options.max_diff);
+  const auto is_near = [&](Timestamp timestamp) {
+    const double t_s = Seconds(timestamp) + Seconds(options.offset);
+    return (!options.range.start || t_s >= Seconds(*options.range.start) - margin_s) &&
+           (!options.range.end || t_s <= Seconds(*options.range.end) + margin_s);
+  };
+  return static_cast<int>(std::ranges::count_if(estimate.timestamps, is_near));
+}
+
 }  // namespace
 
-Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
+Evaluation Evaluate(const Trajectory& whole_reference, const Trajectory& whole_estimate,
                     const EvaluateOptions& options) {
-  const Matches matches = Associate(reference, estimate, options.max_diff, options.offset);
+  const Trajectory reference = Crop(Downsample(whole_reference, options.downsample), options.range);
+  const Trajectory estimate = Downsample(whole_estimate, options.downsample);
+  Matches matches = Associate(reference, estimate, options.max_diff, options.offset);
+  matches.possible = std::min(matches.possible, PosesNear(options, estimate));
   Evaluation evaluation;
   evaluation.label = estimate.name;
   evaluation.options = options;
@@ -116,16 +143,12 @@ Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
   evaluation.alignment =
       Align(options.alignment, evaluation.reference, evaluation.estimate, options.align_poses);
   evaluation.warnings = internal::EvaluationWarnings(evaluation, matches, reference, estimate);
-  if (options.alignment == Alignment::kNone) {
-    AddNees(evaluation);
-  } else {
-    if (estimate.has_covariances()) {
-      evaluation.nees_withheld = std::string("the alignment by ") + ToString(options.alignment) +
-                                 " removes part of the error that the covariance describes; "
-                                 "for the NEES, omit the alignment";
-    }
+  AddNees(evaluation);
+  if (options.alignment != Alignment::kNone) {
     evaluation.estimate = evaluation.alignment * evaluation.estimate;
   }
+  evaluation.reference = Project(evaluation.reference, options.plane);
+  evaluation.estimate = Project(evaluation.estimate, options.plane);
   for (const PoseRelation relation : options.relations) {
     evaluation.absolute.push_back(
         internal::AbsoluteErrors(relation, evaluation.reference, evaluation.estimate));

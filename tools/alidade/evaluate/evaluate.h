@@ -39,6 +39,32 @@ Trajectory operator*(const Similarity& reference_from_estimate, const Trajectory
 Similarity Align(Alignment alignment, const Trajectory& reference, const Trajectory& estimate,
                  int poses = 0);
 
+/// Range of timestamps, with its ends.
+struct TimeRange {
+  std::optional<Timestamp> start, end;  ///< nullopt: no limit
+
+  bool is_unlimited() const { return !start && !end; }
+  /// Returns true if the time is in the range; the ends count.
+  bool Contains(Timestamp timestamp) const;
+};
+/// Returns the poses in the range. Error: kBadData if the range contains no pose, or if the
+/// trajectory has no timestamps.
+Trajectory Crop(const Trajectory& trajectory, const TimeRange& range);
+
+/// Returns at most `poses` poses (0: all), equally spaced by index from the first to the last.
+/// Pose k is that with index floor(k (size - 1) / (poses - 1)).
+Trajectory Downsample(const Trajectory& trajectory, int poses);
+
+/// Plane through the origin of the world.
+enum class Plane { kNone, kXy, kXz, kYz };
+/// Returns `none`, `xy`, `xz` or `yz`.
+const char* ToString(Plane plane);
+
+/// Projects the poses to the plane, as evo does. The coordinate along the normal becomes zero, and
+/// the orientation Rz(c) Ry(b) Rx(a) becomes the rotation about the normal alone: Rz(c) for xy,
+/// Ry(b) for xz with |b| <= pi/2, Rx(a) for yz. The result has no covariances.
+Trajectory Project(const Trajectory& trajectory, Plane plane);
+
 /// Matching poses: indices into the reference and the estimate.
 struct Matches {
   std::vector<int> reference, estimate;
@@ -52,7 +78,8 @@ struct Matches {
 /// the estimate. Poses are matched by row if neither trajectory has timestamps. Two KITTI files are
 /// matched by row unless both have timestamps.
 /// Errors: kBadData if no poses match, if trajectories to match by row differ in length, if only
-/// one trajectory has timestamps, or if the offset is out of the range of a timestamp.
+/// one trajectory has timestamps, or if the offset is out of the range of a timestamp. Matching by
+/// row leaves out a row that was left out of either file.
 Matches Associate(const Trajectory& reference, const Trajectory& estimate, Timestamp max_diff,
                   Timestamp offset);
 
@@ -145,6 +172,9 @@ struct EvaluateOptions {
   Timestamp offset = 0;  ///< added to the timestamps of the estimate
   std::vector<PoseRelation> relations = {PoseRelation::kTranslation, PoseRelation::kAngleDeg};
   PairOptions pairs;
+  int downsample = 0;          ///< number of poses of both trajectories before matching; 0: all
+  TimeRange range;             ///< range of the reference, and so of its matches
+  Plane plane = Plane::kNone;  ///< plane of both trajectories after the alignment
 };
 
 /// Result of the comparison of one estimate with the reference.
@@ -153,7 +183,7 @@ struct Evaluation {
   EvaluateOptions options;
   int possible = 0;
   bool by_row = false;
-  Trajectory reference, estimate;  ///< the matched poses; the estimate is aligned
+  Trajectory reference, estimate;  ///< the matched poses; aligned and projected
   Similarity alignment;
   std::vector<std::pair<int, int>> pairs;  ///< pairs of the relative errors
   std::vector<PoseErrors> absolute, relative;
@@ -171,6 +201,8 @@ struct Evaluation {
 /// Evaluates `estimate`. Warns of conditions under which the results are misleading:
 ///
 ///   - few matches, or an estimate that covers only part of the reference
+///   - numbers of frames in place of timestamps
+///   - positions that do not determine the alignment, such as those of a camera at rest
 ///   - a constant time offset
 ///   - an exchange of reference and estimate, which is detected by names and covariances
 ///   - a scale that is not metric

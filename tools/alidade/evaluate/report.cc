@@ -48,8 +48,25 @@ std::string AlignText(const Evaluation& evaluation) {
   std::string text = ToString(options.alignment);
   const bool least_squares =
       options.alignment != Alignment::kNone && options.alignment != Alignment::kOrigin;
-  if (options.align_poses == 0 || !least_squares) return text;
-  return text + " by the first " + std::to_string(options.align_poses) + " poses";
+  if (options.align_poses != 0 && least_squares) {
+    text += " by the first " + std::to_string(options.align_poses) + " poses";
+  }
+  if (options.plane != Plane::kNone)
+    text += std::string(", projected to ") + ToString(options.plane);
+  return text;
+}
+
+/// Describes the poses that options select before matching. Returns "" if all are selected.
+std::string SelectionText(const EvaluateOptions& options) {
+  std::vector<std::string> parts;
+  if (options.downsample != 0) {
+    parts.push_back("at most " + std::to_string(options.downsample) + " of each file");
+  }
+  if (options.range.start) {
+    parts.push_back("from " + internal::SecondsText(*options.range.start));
+  }
+  if (options.range.end) parts.push_back("to " + internal::SecondsText(*options.range.end));
+  return internal::Join(parts);
 }
 
 std::string PairsText(const Evaluation& evaluation) {
@@ -121,6 +138,8 @@ std::string ConsistencyText(const Evaluation& evaluation) {
 std::string DetailText(const Evaluation& evaluation) {
   std::string text = "reference  " + TrajectoryText(evaluation.reference) + '\n';
   text += "estimate   " + TrajectoryText(evaluation.estimate) + '\n';
+  const std::string selection = SelectionText(evaluation.options);
+  if (!selection.empty()) text += "selected   " + selection + '\n';
   text += "matched    " + MatchedText(evaluation) + " possible poses, ";
   if (evaluation.by_row) {
     text += "by row\n";
@@ -214,6 +233,8 @@ std::string SharedText(const std::vector<Evaluation>& evaluations) {
     text +=
         "; " + NumberText(Seconds(first.options.offset)) + " s added to the estimates' timestamps";
   }
+  const std::string selection = SelectionText(first.options);
+  if (!selection.empty()) text += "; selected poses: " + selection;
   return text + '.';
 }
 
@@ -274,6 +295,11 @@ Json JsonOf(const Evaluation& evaluation) {
   json["by_row"] = evaluation.by_row;
   json["t_max_diff"] = Seconds(evaluation.options.max_diff);
   json["t_offset"] = Seconds(evaluation.options.offset);
+  const TimeRange& range = evaluation.options.range;
+  if (range.start) json["t_start"] = Seconds(*range.start);
+  if (range.end) json["t_end"] = Seconds(*range.end);
+  json["downsample"] = evaluation.options.downsample;
+  json["project_to_plane"] = ToString(evaluation.options.plane);
   json["reference_length_m"] = evaluation.reference.Length(0, evaluation.reference.size() - 1);
   json["estimate_length_m"] = evaluation.estimate.Length(0, evaluation.estimate.size() - 1);
   if (evaluation.sim3_scale) json["sim3_scale"] = *evaluation.sim3_scale;

@@ -10,6 +10,7 @@
 
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
+#include "alidade/evaluate/trajectory_format.h"
 #include "alidade/io/number_rows.h"
 #include "alidade/state/dense_algebra.h"
 
@@ -17,23 +18,6 @@ namespace alidade {
 namespace {
 
 using Format = TrajectoryFormat;
-
-constexpr const char* kTumColumns = "t x y z qx qy qz qw";
-constexpr const char* kFormats =
-    "8 columns (TUM), 20 columns (TUM with covariances), 12 columns (KITTI), or 8 or 17 columns "
-    "separated by commas (EuRoC)";
-constexpr const char* kCovarianceNames[] = {"Pr11", "Pr12", "Pr13", "Pr22", "Pr23", "Pr33",
-                                            "Pt11", "Pt12", "Pt13", "Pt22", "Pt23", "Pt33"};
-
-/// Determines the format of a row from its number of columns.
-Format Detect(const NumberRows& rows) {
-  const std::size_t columns = rows.size();
-  if (rows.has_commas() && (columns == 8 || columns == 17)) return Format::kEuroc;
-  if (!rows.has_commas() && (columns == 8 || columns == 20)) return Format::kTum;
-  if (!rows.has_commas() && columns == 12) return Format::kKitti;
-  rows.FailLine("the row has " + std::to_string(columns) + (columns == 1 ? " column" : " columns"),
-                kFormats);
-}
 
 /// Unit of time in which TUM timestamps may be written by mistake.
 struct TimeUnit {
@@ -80,15 +64,38 @@ TimeUnit UnitOf(const std::vector<double>& timestamps) {
 /// Reader of one pose file.
 class TrajectoryReader {
  public:
-  TrajectoryReader(const std::filesystem::path& file, Format format)
-      : rows_(file, {}, {}, NumberRows::kCommaOrBlanks) {
+  TrajectoryReader(const std::filesystem::path& file, Format format, NonFiniteRows non_finite)
+      : rows_(file, {}, {}, NumberRows::kCommaOrBlanks), non_finite_(non_finite) {
     trajectory_.format = format;
   }
 
+  /// Reads the file. If the format was detected, an error in the data names it.
   Trajectory Read() {
+    try {
+      return ReadRows();
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::kBadData) throw;
+      throw Error(error.code(), error.what() + assumption_);
+    }
+  }
+
+ private:
+  Trajectory ReadRows() {
     trajectory_.name = rows_.name();
-    while (rows_.Next()) AddRow();
-    if (lines_.empty()) rows_.FailLine("the file contains no poses", kFormats);
+    while (rows_.Next()) {
+      const bool is_first = trajectory_.row_count == 0;
+      if (is_first && !has_header_ && internal::IsHeader(rows_)) {
+        has_header_ = true;
+        header_order_ = internal::QuaternionOrder(rows_);
+        continue;
+      }
+      if (is_first) ChooseFormat();
+      AddRow();
+      ++trajectory_.row_count;
+    }
+    if (lines_.empty()) FailEmpty();
+    WarnOfSkippedRows();
+    WarnOfRoundedQuaternions();
     trajectory_.first_line = lines_.front();
     trajectory_.positions.resize(3, std::ssize(positions_));
     for (std::size_t i = 0; i < positions_.size(); ++i) {
@@ -100,14 +107,21 @@ class TrajectoryReader {
     return Sorted();
   }
 
- private:
-  void AddRow() {
-    if (lines_.empty()) {
-      if (trajectory_.format == Format::kDetect) trajectory_.format = Detect(rows_);
-      columns_ = ExpectedColumns();
+  void ChooseFormat() {
+    if (trajectory_.format == Format::kDetect) {
+      const internal::DetectedFormat detected = internal::DetectFormat(rows_, header_order_);
+      row_format_ = detected.row_format;
+      assumption_ = detected.assumption;
+    } else {
+      row_format_ = internal::RowFormatOf(trajectory_.format, rows_);
     }
-    rows_.ExpectColumns(columns_, ColumnNames());
-    switch (trajectory_.format) {
+    trajectory_.format = row_format_.format;
+  }
+
+  void AddRow() {
+    rows_.ExpectColumns(row_format_.columns, row_format_.description);
+    if (IsSkipped()) return;
+    switch (row_format_.format) {
       case Format::kKitti:
         AddKitti();
         break;
@@ -115,34 +129,38 @@ class TrajectoryReader {
         trajectory_.timestamps.push_back(rows_.Index(0, "t"));
         if (!(Seconds(trajectory_.timestamps.back()) < cell::kTimeLimit))
           rows_.FailCell(0, "t", "is beyond 292 years", "ns, as in EuRoC");
-        AddPose({"x", "y", "z", "qw", "qx", "qy", "qz"});
+        AddPose();
         break;
       default:
         AddTum();
     }
     lines_.push_back(rows_.line());
+    trajectory_.rows.push_back(trajectory_.row_count);
   }
 
-  /// Returns the number of columns for the format and the first row.
-  std::size_t ExpectedColumns() const {
-    const std::size_t columns = rows_.size();
-    if (trajectory_.format == Format::kKitti) return 12;
-    if (trajectory_.format == Format::kEuroc) return columns == 17 ? 17 : 8;
-    return columns == 20 ? 20 : 8;
-  }
-  std::string ColumnNames() const {
-    if (trajectory_.format == Format::kKitti) return "the upper three rows of world_from_body";
-    if (trajectory_.format == Format::kEuroc) return "t,x,y,z,qw,qx,qy,qz and optionally nine more";
-    return columns_ == 20 ? "t x y z qx qy qz qw and two covariances" : kTumColumns;
+  /// Returns true if the row is left out, because a value in it is not finite.
+  bool IsSkipped() {
+    const std::span<const char* const> names = row_format_.names;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      double value = 0.0;
+      if (cell::ParseNumber(rows_.text(i), value) == nullptr || std::isfinite(value)) continue;
+      if (non_finite_ == NonFiniteRows::kRefuse) {
+        rows_.FailCell(i, names[i], "is not finite",
+                       "a finite number, or --skip-nan to leave out such rows");
+      }
+      skipped_.Add(rows_.line());
+      return true;
+    }
+    return false;
   }
 
   void AddTum() {
     seconds_.push_back(rows_.Number(0, "t"));
     timestamp_texts_.emplace_back(rows_.text(0));
-    AddPose(kTumPose);
-    if (columns_ != 20) return;
+    AddPose();
+    if (row_format_.names.size() != 20) return;
     double upper[12];
-    for (std::size_t i = 0; i < 12; ++i) upper[i] = rows_.Number(8 + i, kCovarianceNames[i]);
+    for (std::size_t i = 0; i < 12; ++i) upper[i] = rows_.Number(8 + i, row_format_.names[8 + i]);
     trajectory_.orientation_covariances.push_back(Covariance(upper, "orientation"));
     trajectory_.position_covariances.push_back(Covariance(upper + 6, "position"));
   }
@@ -163,12 +181,20 @@ class TrajectoryReader {
   }
 
   /// Appends the pose in columns 1 to 7.
-  void AddPose(const std::array<const char*, 7>& names) {
-    const std::array<double, 7> v = PoseNumbers(rows_, names);
+  void AddPose() {
+    constexpr double kTolerance = 1e-3;
+    constexpr double kRounding = 0.01;  // by 0.005 of each of four elements
+    std::array<double, 7> v{};
+    for (std::size_t i = 0; i < 7; ++i) v[i] = rows_.Number(i + 1, row_format_.names[i + 1]);
     AddPosition({v[0], v[1], v[2]});
-    const bool w_first = trajectory_.format == Format::kEuroc;
-    const Eigen::Quaterniond q = w_first ? Eigen::Quaterniond(v[3], v[4], v[5], v[6])
-                                         : Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
+    const Eigen::Quaterniond q = row_format_.w_first ? Eigen::Quaterniond(v[3], v[4], v[5], v[6])
+                                                     : Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
+    const double error = std::abs(q.norm() - 1.0);
+    if (!(error <= kRounding)) {
+      rows_.FailLine("quaternion of length " + std::to_string(q.norm()),
+                     "a length within 0.01 of 1");
+    }
+    if (error > kTolerance) rounded_.Add(rows_.line());
     trajectory_.orientations.push_back(q.normalized());
   }
 
@@ -183,7 +209,7 @@ class TrajectoryReader {
     constexpr double kTolerance = 1e-3;
     Eigen::Matrix<double, 3, 4, Eigen::RowMajor> pose;
     for (std::size_t i = 0; i < 12; ++i) {
-      pose.data()[i] = rows_.Number(i, "element");
+      pose.data()[i] = rows_.Number(i, row_format_.names[i]);
     }
     const Eigen::Matrix3d rotation = pose.leftCols<3>();
     const double defect =
@@ -194,6 +220,30 @@ class TrajectoryReader {
     }
     AddPosition(pose.col(3));
     trajectory_.orientations.push_back(Eigen::Quaterniond(rotation).normalized());
+  }
+
+  [[noreturn]] void FailEmpty() const {
+    if (skipped_.count == 0)
+      rows_.FailLine("the file contains no poses", internal::kDetectedFormats);
+    rows_.FailLine("the file contains no poses: each of " + std::to_string(skipped_.count) +
+                       " rows has a value that is not finite",
+                   "a row of finite numbers");
+  }
+
+  void WarnOfSkippedRows() {
+    if (skipped_.count == 0) return;
+    Warn(skipped_.first_line, "",
+         std::to_string(skipped_.count) + " of " + std::to_string(trajectory_.row_count) +
+             " rows have a value that is not finite; they are left out",
+         "");
+  }
+
+  void WarnOfRoundedQuaternions() {
+    if (rounded_.count == 0) return;
+    Warn(rounded_.first_line, row_format_.names[4],
+         std::to_string(rounded_.count) + " of " + std::to_string(trajectory_.row_count) +
+             " quaternions have a length that differs from 1 by more than 1e-3",
+         "more decimals; they are normalised");
   }
 
   void ConvertTumTimestamps() {
@@ -224,7 +274,7 @@ class TrajectoryReader {
     if (!positions_.front().isZero(0.0) || trajectory_.format == Format::kKitti) return;
     const Trajectory reordered = trajectory_.Select({0}).WithOtherQuaternionOrder();
     if (reordered.orientations[0].vec() != Eigen::Vector3d::Zero()) return;
-    const bool w_first = trajectory_.format == Format::kEuroc;
+    const bool w_first = row_format_.w_first;
     Warn(lines_.front(), w_first ? "qw" : "qx",
          std::string("the first pose is the identity if the quaternion is read with w ") +
              (w_first ? "last" : "first"),
@@ -272,9 +322,23 @@ class TrajectoryReader {
     trajectory_.warnings.push_back(ErrorLine({rows_.name(), line, 0}, key, problem, expected));
   }
 
+  /// Number of rows with the same defect.
+  struct DefectCount {
+    int count = 0, first_line = 0;
+
+    void Add(int line) {
+      if (count++ == 0) first_line = line;
+    }
+  };
+
   NumberRows rows_;
+  NonFiniteRows non_finite_;
   Trajectory trajectory_;
-  std::size_t columns_ = 0;
+  bool has_header_ = false;
+  internal::HeaderOrder header_order_;
+  internal::RowFormat row_format_;
+  std::string assumption_;  ///< end of a message; "" if the format is given
+  DefectCount skipped_, rounded_;
   std::vector<int> lines_;
   std::vector<Eigen::Vector3d> positions_;
   std::vector<double> seconds_;               ///< TUM timestamps before their unit is known
@@ -298,22 +362,29 @@ std::filesystem::path FindTimes(const std::filesystem::path& file) {
   return {};
 }
 
-void ReadTimes(const std::filesystem::path& times, Trajectory& trajectory) {
-  NumberRows rows(times, {}, {}, ' ');
+/// Reads the timestamps of all rows of a KITTI file, and adds those of its poses.
+void ReadTimes(const std::filesystem::path& file, Trajectory& trajectory) {
+  NumberRows rows(file, {}, {}, ' ');
+  std::vector<Timestamp> times;
   while (rows.Next()) {
     rows.ExpectColumns(1, "t");
-    trajectory.timestamps.push_back(rows.Time(0, "t"));
-    const std::size_t n = trajectory.timestamps.size();
-    if (n > 1 && trajectory.timestamps[n - 2] >= trajectory.timestamps[n - 1]) {
+    times.push_back(rows.Time(0, "t"));
+    const std::size_t n = times.size();
+    if (n > 1 && times[n - 2] >= times[n - 1]) {
       rows.FailCell(0, "t", "is not after the previous time", "times that increase");
     }
   }
-  if (std::ssize(trajectory.timestamps) == trajectory.size()) return;
+  if (std::ssize(times) == trajectory.row_count) {
+    for (const int row : trajectory.rows) {
+      trajectory.timestamps.push_back(times[static_cast<std::size_t>(row)]);
+    }
+    return;
+  }
   const std::filesystem::path dedicated = DedicatedTimes(trajectory.name);
-  const bool shared = times.filename() != dedicated;
-  rows.FailLine("the number of times is " + std::to_string(trajectory.timestamps.size()) +
+  const bool shared = file.filename() != dedicated;
+  rows.FailLine("the number of times is " + std::to_string(times.size()) +
                     ", but the number of poses in " + trajectory.name + " is " +
-                    std::to_string(trajectory.size()),
+                    std::to_string(trajectory.row_count),
                 "one time for each pose" +
                     (shared ? ", or a file " + dedicated.string() + " in the same folder" : ""));
 }
@@ -337,6 +408,7 @@ Trajectory Trajectory::Select(const std::vector<int>& indices) const {
   Trajectory part;
   part.name = name;
   part.format = format;
+  part.row_count = row_count;
   part.first_line = first_line;
   part.warnings = warnings;
   part.positions.resize(3, std::ssize(indices));
@@ -344,6 +416,7 @@ Trajectory Trajectory::Select(const std::vector<int>& indices) const {
     const auto i = static_cast<std::size_t>(indices[k]);
     part.positions.col(static_cast<Eigen::Index>(k)) = positions.col(indices[k]);
     part.orientations.push_back(orientations[i]);
+    if (!rows.empty()) part.rows.push_back(rows[i]);
     if (has_timestamps()) part.timestamps.push_back(timestamps[i]);
     if (!has_covariances()) continue;
     part.position_covariances.push_back(position_covariances[i]);
@@ -361,8 +434,9 @@ Trajectory Trajectory::WithOtherQuaternionOrder() const {
   return reordered;
 }
 
-Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format) {
-  Trajectory trajectory = TrajectoryReader(file, format).Read();
+Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format,
+                          NonFiniteRows non_finite) {
+  Trajectory trajectory = TrajectoryReader(file, format, non_finite).Read();
   if (trajectory.format == TrajectoryFormat::kKitti) {
     const std::filesystem::path times = FindTimes(file);
     if (!times.empty()) ReadTimes(times, trajectory);

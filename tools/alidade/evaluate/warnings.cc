@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <optional>
 
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
@@ -27,6 +28,8 @@ constexpr double kMinLength = 0.5;        ///< minimum of matched length / refer
 constexpr double kMaxErrorRatio = 10.0;   ///< maximum of error without / error with alignment
 constexpr double kMinBodyTurnDeg = 10.0;  ///< a larger common turn is not an estimation error
 constexpr double kMaxRemainder = 0.25;    ///< maximum of error after / before a correction
+constexpr double kMinExplained = 0.5;     ///< minimum share of the variance that sim3 explains
+constexpr const char* kTimesOfFrames = "the time of each frame, from the list of its images";
 constexpr const char* kEurocTruth = "state_groundtruth_estimate0";
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 
@@ -85,6 +88,46 @@ bool SpansAPlane(const Eigen::Matrix3Xd& points) {
   return squared_widths[1] > kThin * kThin * squared_widths[2];
 }
 
+/// Returns true if `sim3` with the scale s explains at least half of the variance of the reference,
+/// s^2 var(estimate) >= 0.5 var(reference).
+bool AreCorrelated(const Eigen::Matrix3Xd& reference, const Eigen::Matrix3Xd& estimate) {
+  const std::optional<Similarity> sim3 = internal::FindSimilarity(estimate, reference);
+  return sim3 && sim3->scale * sim3->scale * internal::SquaredExtent(estimate) >=
+                     kMinExplained * internal::SquaredExtent(reference);
+}
+
+/// Returns the subject of a sentence: the quantities that positions determine in an alignment.
+std::string UndeterminedText(Alignment alignment) {
+  if (alignment == Alignment::kScale) return "the scale is";
+  if (alignment == Alignment::kSim3) return "the rotation and the scale of sim3 are";
+  return std::string("the rotation of ") + ToString(alignment) + " is";
+}
+
+/// Returns true if the timestamps may be numbers of frames: whole numbers below 1e8 in the unit of
+/// the file, 1 to 100 apart in the median.
+bool MayBeFrameNumbers(const Trajectory& trajectory) {
+  const std::vector<Timestamp>& timestamps = trajectory.timestamps;
+  const Timestamp unit = trajectory.format == TrajectoryFormat::kEuroc ? 1 : 1'000'000'000;
+  if (timestamps.size() < 3 || timestamps.back() >= 100'000'000 * unit) return false;
+  std::vector<Timestamp> steps;
+  for (std::size_t i = 0; i < timestamps.size(); ++i) {
+    if (timestamps[i] % unit != 0 || timestamps[i] < 0) return false;
+    if (i > 0) steps.push_back(timestamps[i] - timestamps[i - 1]);
+  }
+  const auto median = steps.begin() + std::ssize(steps) / 2;
+  std::nth_element(steps.begin(), median, steps.end());
+  return *median >= unit && *median <= 100 * unit;
+}
+
+/// Returns the trajectory whose timestamps may be numbers of frames, if those of the other cannot.
+/// Otherwise returns nullptr.
+const Trajectory* WithFrameNumbers(const Trajectory& reference, const Trajectory& estimate) {
+  const bool reference_may = MayBeFrameNumbers(reference),
+             estimate_may = MayBeFrameNumbers(estimate);
+  if (reference_may == estimate_may) return nullptr;
+  return reference_may ? &reference : &estimate;
+}
+
 /// Collector of the warnings of one evaluation.
 class WarningCollector {
  public:
@@ -100,8 +143,10 @@ class WarningCollector {
     CheckMatches();
     CheckTimestamps();
     CheckPath();
-    if (evaluation_.estimate.size() < kMinPoses || !evaluation_.sim3_scale) return warnings_;
+    CheckAlignment();
     const Trajectory& reference = evaluation_.reference;
+    if (reference.size() < kMinPoses) return warnings_;
+    if (!AreCorrelated(reference.positions, evaluation_.estimate.positions)) return warnings_;
     const Similarity sim3 = Align(Alignment::kSim3, reference, evaluation_.estimate);
     CheckScale(sim3);
     CheckWorld();
@@ -141,6 +186,14 @@ class WarningCollector {
   void CheckMatches() {
     const int matched = evaluation_.estimate.size();
     if (matched >= kMinMatches * matches_.possible) return;
+    if (const Trajectory* numbered = WithFrameNumbers(whole_reference_, whole_estimate_)) {
+      warnings_.push_back(
+          ErrorLine({numbered->name, numbered->first_line, 0}, "t",
+                    std::to_string(matched) + " of " + std::to_string(matches_.possible) +
+                        " possible poses match: the timestamps are probably numbers of frames",
+                    kTimesOfFrames));
+      return;
+    }
     Warn(std::to_string(matched) + " of " + std::to_string(matches_.possible) +
              " possible poses match within " + RoundedText(Seconds(evaluation_.options.max_diff)) +
              " s",
@@ -171,6 +224,26 @@ class WarningCollector {
     Warn("the estimate covers only " + RoundedText(matched, 3) + " m of the " +
              RoundedText(length, 3) + " m of the reference",
          "an estimate of the whole trajectory");
+  }
+
+  /// Warns if the positions that determine the alignment are not correlated. Those of a motionless
+  /// trajectory are equal except for noise.
+  void CheckAlignment() {
+    const EvaluateOptions& options = evaluation_.options;
+    if (options.alignment == Alignment::kNone || options.alignment == Alignment::kOrigin) return;
+    const Eigen::Index poses = evaluation_.estimate.size();
+    const Eigen::Index used =
+        options.align_poses == 0 ? poses : std::min<Eigen::Index>(poses, options.align_poses);
+    const Eigen::Matrix3Xd reference = evaluation_.reference.positions.leftCols(used);
+    const Eigen::Matrix3Xd estimate = evaluation_.estimate.positions.leftCols(used);
+    if (AreCorrelated(reference, estimate)) return;
+    const auto spread = [](const Eigen::Matrix3Xd& points) {
+      return RoundedText(std::sqrt(internal::SquaredExtent(points)), 3) + " m";
+    };
+    Warn(UndeterminedText(options.alignment) + " undetermined: the positions of " +
+             std::to_string(used) + " poses are uncorrelated, with a spread of " +
+             spread(estimate) + " in the estimate and " + spread(reference) + " in the reference",
+         "poses that move, --align-origin or no alignment");
   }
 
   void CheckScale(const Similarity& sim3) {
@@ -246,6 +319,13 @@ class WarningCollector {
 };
 
 }  // namespace
+
+std::string internal::FrameNumberRemedy(const Trajectory& reference, const Trajectory& estimate) {
+  const Trajectory* const numbered = WithFrameNumbers(reference, estimate);
+  if (numbered == nullptr) return {};
+  return std::string(kTimesOfFrames) + ", because the timestamps of " + numbered->name +
+         " are probably numbers of frames; or ";
+}
 
 std::vector<std::string> internal::EvaluationWarnings(const Evaluation& evaluation,
                                                       const Matches& matches,

@@ -15,4 +15,8 @@ std::vector<std::string> EvaluationWarnings(const Evaluation& evaluation, const 
                                             const Trajectory& reference,
                                             const Trajectory& estimate);
 
+/// Returns the remedy, followed by `; or `, if the timestamps of only one trajectory may be numbers
+/// of frames. Otherwise returns "".
+std::string FrameNumberRemedy(const Trajectory& reference, const Trajectory& estimate);
+
 }  // namespace alidade::internal

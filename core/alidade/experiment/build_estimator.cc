@@ -69,6 +69,11 @@ std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
   return names;
 }
 
+bool ExpectsPoor(const Node& entry) {
+  const auto expect = entry.Find("expect");
+  return expect && expect->Choice({"good", "poor"}) == 1;
+}
+
 void CheckName(const std::string& name, const Node& entry) {
   ExpectName(name, entry, "an estimator");
   if (name == "figures") {
@@ -86,16 +91,18 @@ void CheckName(const std::string& name, const Node& entry) {
   }
   std::vector<std::string> names = of_core;
   names.insert(names.end(), of_plugins.begin(), of_plugins.end());
+  const std::string nearest = Nearest(name, names);
   const std::string expected = "a built-in type (" + Join(of_core) + ") or a type of a plugin (" +
                                (of_plugins.empty() ? "none was found" : Join(of_plugins)) + ')';
   constexpr const char* kHint =
       "\n  batch estimators need a build with the Ceres solver: "
       "cmake --preset release && cmake --build --preset release";
+  const std::string places = (of_plugins.empty() ? kHint : "") + ("\n" + PluginPlaces(host));
   throw Error(ExitCode::kPlugin,
               ErrorLine(node.place(), node.path(),
                         "estimator type '" + name + "' is neither built in nor in a plugin",
-                        expected, Nearest(name, names)) +
-                  (of_plugins.empty() ? kHint : "") + "\n" + PluginPlaces(host));
+                        expected, nearest) +
+                  (nearest.empty() || !host.refusals().empty() ? places : ""));
 }
 
 /// Returns the entry of the estimator `type` of a plugin. Error: kPlugin if no plugin provides this
@@ -278,6 +285,7 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
                              const PluginHost& host, const std::vector<StreamInfo>* streams,
                              const std::vector<EstimatorSpec>& earlier_estimators) {
   CheckName(name, entry);
+  entry.ExpectMap("{type: ekf}");
   EstimatorSpec spec;
   spec.name = name;
   const Node type = entry.At("type", "an estimator");
@@ -290,6 +298,7 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
       of_core != nullptr ? of_core->capabilities : CapabilitiesOf(*of_plugin);
   const EstimatorMaker make =
       of_core != nullptr ? of_core->read(entry) : CreateEstimator(host, spec.type, entry);
+  spec.expects_poor = ExpectsPoor(entry);
   if (const auto policy = entry.Find("on_divergence")) {
     spec.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
   }

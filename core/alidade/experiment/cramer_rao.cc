@@ -101,8 +101,8 @@ std::string CramerRaoBound::WhyUnavailable(const Problem& problem,
 
 CramerRaoBound::CramerRaoBound(const Problem& problem, const std::vector<StreamInfo>& streams,
                                const std::vector<StreamInfo>& truths, TrueLandmark true_landmark)
-    : engine_(IdealProblem(problem), WithoutRecovery({}), streams,
-              std::make_unique<EkfEquations>()),
+    : engine_(IdealProblem(problem), EkfOptions{.rejection_recovery = RejectionRecovery::kNone},
+              streams, std::make_unique<EkfEquations>()),
       true_landmark_(std::move(true_landmark)),
       truths_(MatchTruths(problem.layout, truths)) {
   ALIDADE_EXPECTS(WhyUnavailable(problem, truths).empty());

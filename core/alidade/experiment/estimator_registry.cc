@@ -30,20 +30,17 @@ EkfOptions ReadCommon(Params& p) {
       p.NumberOrNone("max_dt_s", "s", "longest step; longer gaps are divided into equal steps",
                      kPositive)
           .value_or(options.max_dt_s);
-  return options;
-}
-
-/// Reads the options of a filter with rejection recovery.
-EkfOptions ReadWithRecovery(Params& p) {
-  EkfOptions options = ReadCommon(p);
   options.rejection_recovery = static_cast<RejectionRecovery>(
       p.Choice("rejection_recovery.action", {"reset", "inflate", "none"},
                "action after `rejection_recovery.after` rejections",
                static_cast<int>(options.rejection_recovery)));
   options.rejection_recovery_after =
-      p.Integer("rejection_recovery.after",
-                "number of consecutive rejections of one sensor that causes the action", 1,
-                1'000'000, options.rejection_recovery_after);
+      p.Integer("rejection_recovery.after", "consecutive rejections of one sensor", 1, 1'000'000,
+                options.rejection_recovery_after);
+  options.rejection_recovery_after_s =
+      p.NumberOrNone("rejection_recovery.after_s", "s",
+                     "time without an accepted measurement of a rejected sensor", kPositive)
+          .value_or(options.rejection_recovery_after_s);
   options.max_covariance_repairs =
       p.Integer("max_covariance_repairs",
                 "maximum number of covariance repairs; the next one ends the estimator", 0,
@@ -52,7 +49,7 @@ EkfOptions ReadWithRecovery(Params& p) {
 }
 
 EkfOptions ReadEkf(Params& p) {
-  EkfOptions options = ReadWithRecovery(p);
+  EkfOptions options = ReadCommon(p);
   options.jacobian = static_cast<JacobianPolicy>(
       p.Choice("jacobian", {"latest", "first_estimate"},
                "linearisation point of H for blocks of stationary models",
@@ -61,7 +58,7 @@ EkfOptions ReadEkf(Params& p) {
 }
 
 IekfOptions ReadIekf(Params& p) {
-  IekfOptions options{ReadWithRecovery(p)};
+  IekfOptions options{ReadCommon(p)};
   options.max_iterations =
       p.Integer("max_iterations", "maximum number of linearisations per update", 2, 1000,
                 options.max_iterations);

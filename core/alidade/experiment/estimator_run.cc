@@ -76,7 +76,7 @@ void EstimatorRun::AddEstimate(std::size_t k, const FrameWithSegments& frame, co
   if (!needs_reference) {
     metrics.Add(frame.frame, frame.in_segment, state, report);
   } else {
-    metrics.AddReport(frame.in_segment, report);
+    metrics.AddReport(frame.frame.timestamp, frame.in_segment, report);
     if (!report.stale) {
       estimates.push_back({k, ValuesOf(state, spec.problem.layout.blocks().size())});
     }
@@ -115,6 +115,7 @@ EstimatorResult InitialResult(const EstimatorSpec& spec, const Experiment& exper
     result.accepted_by = experiment.estimators[static_cast<std::size_t>(spec.accepted_by)].name;
   }
   result.overrides = spec.overrides;
+  result.expects_poor = spec.expects_poor;
   result.sensors = NamesOf(spec.problem.sensors);
   const BlockId position = PositionBlockOf(spec.problem);
   if (position >= 0) result.position_block = spec.problem.layout[position].name;

@@ -22,7 +22,8 @@ using internal::NamesOf;
 constexpr int kSchema = 1;
 
 void CheckSchema(const Node& root) {
-  const Node version = root.At("alidade", "every config, because it is the version of the schema");
+  const Node version = root.At("alidade", "every config, because it is the version of the schema",
+                               "the first line `alidade: 1`");
   const std::int64_t config_version = version.Integer(1, 1'000'000);
   if (config_version > kSchema) {
     version.Fail("schema version " + std::to_string(config_version) + " is newer than this program",
@@ -270,11 +271,15 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   internal::CheckStreams(root, full_problem, streams);
   experiment.out_of_sequence.ranks = RanksOf(streams, full_problem);
   experiment.segments = ReadSegments(root, full_problem, streams);
-  for (const auto& [name, entry] : root.At("estimators", "a run").Entries()) {
+  constexpr const char* kEstimators = "ekf: {type: ekf}";
+  const Node estimators = root.At("estimators", "a run", "estimators: {ekf: {type: ekf}}");
+  estimators.ExpectMap(kEstimators);
+  for (const auto& [name, entry] : estimators.Entries()) {
     internal::AddEstimator(calibrated, host, name, experiment);
   }
   if (experiment.estimators.empty()) {
-    root.At("estimators").Fail("the map is empty", "at least one estimator");
+    estimators.Fail("the map is empty",
+                    "at least one estimator, as in " + std::string(kEstimators));
   }
   experiment.reference = ReadReference(root, experiment.estimators);
   experiment.guide = ReadGuide(source, experiment);

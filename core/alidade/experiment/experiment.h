@@ -41,7 +41,8 @@ struct EstimatorSpec {
   std::unique_ptr<Estimator> estimator;
   OnDivergence on_divergence = OnDivergence::kReport;
   OnPluginFailure on_plugin_failure = OnPluginFailure::kSkip;
-  std::string overrides;  ///< `overrides` in the entry of the estimator as YAML, or ""
+  bool expects_poor = false;  ///< `expect: poor`: the verdict on the run ignores this estimator
+  std::string overrides;      ///< `overrides` in the entry of the estimator as YAML, or ""
   /// Index of an earlier online estimator. This estimator uses only the measurements that the
   /// earlier estimator accepted or used to initialise a state. -1: this estimator uses all
   /// measurements.

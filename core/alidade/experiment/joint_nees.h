@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <span>
 
+#include "alidade/estimation/problem.h"
 #include "alidade/state/state.h"
 
 namespace alidade::internal {
@@ -12,7 +13,8 @@ namespace alidade::internal {
 struct BlockError {
   BlockId id;
   const Eigen::VectorXd* error;
-  double truth_variance;  ///< variance of each element of the truth
+  double truth_variance;     ///< variance of each element of the truth
+  double prior_sigma = 0.0;  ///< result of LargestPriorSigma
 };
 
 /// NEES e' C^-1 e with its degrees of freedom.
@@ -21,7 +23,13 @@ struct Nees {
   int dof = 0;         ///< 0 if no block is estimated
 };
 
-/// Computes the joint NEES of the estimated blocks among `errors`. Metrics defines C = P + T.
+/// Returns the largest standard deviation of an element of the prior of a block; 0 if the block has
+/// no prior covariance.
+double LargestPriorSigma(const Problem& problem, BlockId id);
+
+/// Computes the joint NEES of the estimated blocks among `errors`. Metrics defines C = P + T. A
+/// direction whose sigma is below 1e-9 of the largest prior sigma of its block counts neither in
+/// the NEES nor in its degrees of freedom, because rounding errors exceed such a sigma.
 Nees JointNees(const State& state, std::span<const BlockError> errors);
 
 }  // namespace alidade::internal

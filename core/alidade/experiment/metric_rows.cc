@@ -200,14 +200,13 @@ std::vector<TableRow> SelectRows(const RunResult& result, const Predicate& is_in
   return rows;
 }
 
-void AddHealthRows(const RunResult& result, std::vector<TableRow>& rows) {
-  TableRow diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
+/// Adds the row of the verdicts before the other rows.
+void AddVerdictRow(const RunResult& result, std::vector<TableRow>& rows) {
+  TableRow verdict{"verdict", {}};
   for (const EstimatorResult& estimator : result.estimators) {
-    diverged.cells.emplace_back(estimator.diverged ? "yes" : "no");
-    inconsistent.cells.emplace_back(estimator.inconsistent ? "yes" : "no");
+    verdict.cells.emplace_back(ToString(estimator.verdict.state));
   }
-  rows.push_back(std::move(diverged));
-  rows.push_back(std::move(inconsistent));
+  rows.insert(rows.begin(), std::move(verdict));
 }
 
 constexpr std::size_t kMainRows = 10;
@@ -221,7 +220,7 @@ int PriorityOf(const MetricKey& key) {
   return metric == nullptr ? 0 : metric->priority;
 }
 
-/// Returns the keys of MainRows() without `diverged` and `inconsistent`. Each round chooses one
+/// Returns the keys of MainRows() without the verdict. Each round chooses one
 /// subject of each metric.
 std::set<std::string> MainKeys(const RunResult& result, const std::vector<std::string>& subjects) {
   // Each pair consists of the index of a subject and a key.
@@ -246,7 +245,7 @@ std::set<std::string> MainKeys(const RunResult& result, const std::vector<std::s
   }
   std::sort(ranked.begin(), ranked.end());
   std::set<std::string> chosen;
-  for (std::size_t i = 0; i < std::min(ranked.size(), kMainRows - 2); ++i) {
+  for (std::size_t i = 0; i < std::min(ranked.size(), kMainRows - 1); ++i) {
     chosen.insert(std::get<2>(ranked[i]));
   }
   return chosen;
@@ -292,7 +291,7 @@ std::vector<TableRow> RowsOf(const RunResult& result, const std::string& name,
 
 std::vector<TableRow> ComparisonRows(const RunResult& result) {
   std::vector<TableRow> rows = MetricRows(result);
-  AddHealthRows(result, rows);
+  AddVerdictRow(result, rows);
   return rows;
 }
 
@@ -317,7 +316,7 @@ std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::s
   const std::set<std::string> keys = MainKeys(result, subjects);
   std::vector<TableRow> rows =
       SelectRows(result, [&](const std::string& key) { return keys.contains(key); });
-  AddHealthRows(result, rows);
+  AddVerdictRow(result, rows);
   return rows;
 }
 
@@ -336,6 +335,66 @@ std::string ReferenceText(const RunResult& result) {
 }
 
 }  // namespace internal
+
+namespace {
+
+/// Returns at most three findings, a line each, without the finding that the verdict states.
+std::string FindingLines(const EstimatorResult& estimator, const std::string& indent) {
+  constexpr std::size_t kMaxShown = 3;
+  std::string text;
+  std::size_t count = 0;
+  for (const Finding& finding : estimator.findings) {
+    if (finding.text == estimator.verdict.because) continue;
+    if (++count <= kMaxShown) text += indent + finding.text + '\n';
+  }
+  if (count < 2) return text;
+  text += indent + "the first of these findings usually explains the others";
+  if (count > kMaxShown) {
+    text += "; `alidade diagnose` lists " + std::to_string(count - kMaxShown) + " more";
+  }
+  return text + '\n';
+}
+
+/// Returns the first estimator before `estimator` with the same findings, or null if `estimator`
+/// has no finding.
+const EstimatorResult* WithSameFindings(const RunResult& result, const EstimatorResult& estimator) {
+  for (const EstimatorResult& earlier : result.estimators) {
+    if (&earlier == &estimator || estimator.findings.empty()) return nullptr;
+    if (std::ranges::equal(earlier.findings, estimator.findings, {}, &Finding::text,
+                           &Finding::text))
+      return &earlier;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+std::optional<VerdictState> WorstVerdict(const RunResult& result) {
+  std::optional<VerdictState> worst;
+  for (const EstimatorResult& estimator : result.estimators) {
+    if (estimator.expects_poor) continue;
+    worst = worst ? std::min(*worst, estimator.verdict.state) : estimator.verdict.state;
+  }
+  return worst;
+}
+
+std::string VerdictText(const RunResult& result) {
+  std::size_t width = 0;
+  for (const EstimatorResult& estimator : result.estimators) {
+    width = std::max(width, estimator.name.size());
+  }
+  std::string text;
+  for (const EstimatorResult& estimator : result.estimators) {
+    const Verdict& verdict = estimator.verdict;
+    const std::string indent(width + 2, ' ');
+    text += estimator.name + indent.substr(estimator.name.size()) + ToString(verdict.state) + ": " +
+            verdict.because + '\n';
+    const EstimatorResult* const same = WithSameFindings(result, estimator);
+    text += same ? indent + "the same findings as for " + same->name + '\n'
+                 : FindingLines(estimator, indent);
+  }
+  return text;
+}
 
 std::string ComparisonTable(const RunResult& result) {
   return internal::TableOf(result, internal::ComparisonRows(result));

@@ -17,15 +17,15 @@ std::vector<std::string> OrderedCounts(const RunResult& result);
 
 /// Returns the rows of the metrics that tables show, and of all counts.
 std::vector<TableRow> MetricRows(const RunResult& result);
-/// Returns MetricRows() and the rows `diverged` and `inconsistent`.
+/// Returns the row `verdict` and MetricRows().
 std::vector<TableRow> ComparisonRows(const RunResult& result);
 /// Returns the subjects of rows in the order of the config: the blocks, their owners and the
 /// sensors of each estimator.
 std::vector<std::string> SubjectsOf(const Experiment& experiment);
-/// Returns ComparisonRows() if they are at most ten rows. Otherwise returns `diverged`,
-/// `inconsistent` and eight other rows in the same order, without rows of segments. The selection
-/// proceeds in rounds. Each round chooses one subject of each metric, in the order of priority;
-/// subjects that `subjects` does not contain come last.
+/// Returns ComparisonRows() if they are at most ten rows. Otherwise returns `verdict` and nine
+/// other rows in the same order, without rows of segments. The selection proceeds in rounds. Each
+/// round chooses one subject of each metric, in the order of priority; subjects that `subjects`
+/// does not contain come last.
 std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::string>& subjects);
 /// Returns the table of MainRows(), with the number of omitted rows.
 std::string MainTable(const RunResult& result, const std::vector<std::string>& subjects);

@@ -26,8 +26,8 @@ enum class MetricUnit {
 /// Best value of a metric.
 enum class MetricGoal { kNone, kZero, kOne, k95Percent };
 
-/// Method that reduces the samples of a run to the value of a metric.
-enum class MetricReduction { kMean, kRootMean, kMax, kLast };
+/// How the samples of a run are reduced to the metric.
+enum class MetricReduction { kMean, kRootMean, kSum, kLast };
 
 /// Section of a comparison that shows a metric.
 enum class MetricSection {
@@ -48,10 +48,12 @@ struct OwnerSample {
   int dof;
   double bound95;  ///< chi2(0.95, dof)
 };
-/// Innovation of one accepted measurement.
+/// Innovation of one measurement that was accepted, or that the gate rejected.
 struct SensorSample {
   double nis;
   int dof;
+  double log_det_s;
+  bool is_accepted;
 };
 /// Error of the state that one measurement implies without a filter.
 struct ImpliedSample {
@@ -232,18 +234,42 @@ inline constexpr std::array kMetrics = {
                .is_shown_by_segment = true,
                .section = MetricSection::kAlong,
                .label = "in the 95 % region"},
+    MetricInfo{.name = "nis.mean",
+               .meaning = "mean of r' S^-1 r / dof over accepted measurements",
+               .subject = MetricSubject::kSensor,
+               .goal = MetricGoal::kOne,
+               .needs_truth = false,
+               .sensor = [](const SensorSample& s) -> std::optional<double> {
+                 if (!s.is_accepted) return std::nullopt;
+                 return s.nis / s.dof;
+               },
+               .has_segments = true,
+               .is_shown = true,
+               .priority = 3,
+               .section = MetricSection::kAlong,
+               .label = "NIS"},
     MetricInfo{
-        .name = "nis.mean",
-        .meaning = "mean of r' S^-1 r / dof over accepted measurements",
+        .name = "nis.all",
+        .meaning = "mean of r' S^-1 r / dof over all measurements, also those that the gate "
+                   "rejected",
         .subject = MetricSubject::kSensor,
         .goal = MetricGoal::kOne,
         .needs_truth = false,
         .sensor = [](const SensorSample& s) -> std::optional<double> { return s.nis / s.dof; },
         .has_segments = true,
-        .is_shown = true,
-        .priority = 3,
-        .section = MetricSection::kAlong,
-        .label = "NIS"},
+        .is_shown = true},
+    MetricInfo{.name = "log_likelihood",
+               .meaning = "-1/2 sum (dof log 2 pi + log det S + r' S^-1 r) over all measurements, "
+                          "also those that the gate rejected",
+               .subject = MetricSubject::kSensor,
+               .needs_truth = false,
+               .sensor = [](const SensorSample& s) -> std::optional<double> {
+                 constexpr double kLog2Pi = 1.8378770664093453;
+                 if (std::isnan(s.log_det_s)) return std::nullopt;
+                 return -0.5 * (s.dof * kLog2Pi + s.log_det_s + s.nis);
+               },
+               .reduction = MetricReduction::kSum,
+               .has_segments = true},
     MetricInfo{.name = "nis.low",
                .meaning = "lower 95 % bound of `nis.mean`, see "
                           "[Bounds](metrics.md#bounds-of-nees-and-nis)",

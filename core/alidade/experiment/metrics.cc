@@ -21,14 +21,15 @@
 #include "alidade/experiment/time_series.h"
 #include "alidade/experiment/truth_match.h"
 #include "alidade/model/geometry.h"
+#include "alidade/state/dense_algebra.h"
 #include "alidade/state/element_names.h"
 
 namespace alidade {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kInconsistentSigmas = 10.0;
-constexpr int kInconsistentTimestamps = 20;
+constexpr double kLostSigmas = 10.0;
+constexpr int kLostTimestamps = 20;
 constexpr double kFarSigmas = 100.0;
 constexpr double kFarAngleSigmas = 5.0;
 
@@ -47,12 +48,11 @@ bool IsFarAngle(const MeasurementReport& measurement) {
 struct Metrics::Impl {
   /// Sums of the samples of one metric for one subject.
   struct Accumulator {
-    double sum = 0.0, max = 0.0, last = 0.0;
+    double sum = 0.0, last = 0.0;
     std::int64_t count = 0;
 
     void Add(double value) {
       sum += value;
-      max = count == 0 ? value : std::max(max, value);
       last = value;
       ++count;
     }
@@ -61,8 +61,8 @@ struct Metrics::Impl {
       switch (reduction) {
         case MetricReduction::kRootMean:
           return std::sqrt(mean);
-        case MetricReduction::kMax:
-          return max;
+        case MetricReduction::kSum:
+          return sum;
         case MetricReduction::kLast:
           return last;
         case MetricReduction::kMean:
@@ -143,6 +143,7 @@ struct Metrics::Impl {
     std::vector<int> outside_counts;
     bool is_scalar;
     double truth_variance;  ///< variance of each element of the truth
+    double prior_sigma;     ///< largest sigma of its prior; 0: it has none
     LagSeries series;       ///< used only for a scalar block
     bool was_ever_known = false;
 
@@ -181,6 +182,7 @@ struct Metrics::Impl {
     std::string name;
     std::vector<std::size_t> blocks;  ///< indices into tracked_blocks
     ThinnedSeries nees = {};          ///< NEES divided by its dof
+    std::int64_t dof_sum = 0, count = 0;
   };
 
   /// Data for the NIS bounds of a sensor.
@@ -201,9 +203,18 @@ struct Metrics::Impl {
   struct FarOffCounts {
     std::int64_t total = 0, far_off = 0;
   };
-  std::vector<FarOffCounts> far_off_counts;  ///< one element per sensor
-  std::vector<bool> measures_angle;          ///< one element per sensor
-  std::vector<NisSamples> nis_samples;       ///< one element per sensor
+  std::vector<FarOffCounts> far_off_counts;   ///< one element per sensor
+  std::vector<bool> measures_angle;           ///< one element per sensor
+  std::vector<NisSamples> nis_samples;        ///< one element per sensor
+  std::vector<SensorUse> uses;                ///< one element per sensor
+  std::vector<InnovationSeries> innovations;  ///< one element per sensor
+  /// Times of the frames with a used measurement, and the longest time between two of them.
+  struct {
+    std::int64_t frames = 0;
+    Timestamp first = kNoTimestamp, last = kNoTimestamp;
+    Timestamp last_frame = kNoTimestamp;  ///< last frame, with or without a used measurement
+    Gap longest = {};
+  } used;
   std::int64_t report_count = 0;
   std::map<int, std::vector<double>> reprojection;  ///< rms of each frame, by sensor
   std::vector<PeriodSums> periods;  ///< element 0 is the whole run; the segments follow
@@ -227,8 +238,11 @@ struct Metrics::Impl {
   void CheckElement(Timestamp timestamp, TrackedBlock& block, int element, double sigma);
   void AddNees(Owner& owner, std::size_t index, const std::vector<PeriodSums*>& destinations,
                const State& state);
-  void AddReport(const std::vector<PeriodSums*>& destinations, const UpdateReport& report);
+  void AddReport(Timestamp timestamp, const std::vector<PeriodSums*>& destinations,
+                 const UpdateReport& report);
   void AddInnovation(std::size_t sensor, const MeasurementReport& measurement);
+  void AddTimes(Timestamp timestamp, const UpdateReport& report);
+  void AddUse(std::size_t sensor, Timestamp timestamp, const MeasurementReport& measurement);
   /// Returns the accumulators of the whole run, and of each segment that contains the frame.
   std::vector<PeriodSums*> PeriodsOf(const std::vector<bool>& in_segment);
   const std::string& SubjectOf(const MetricInfo& metric, std::size_t index) const;
@@ -262,6 +276,7 @@ void Metrics::Impl::TrackBlocks(const Problem& problem, const std::vector<Stream
     tracked_block.is_scalar = block.geometry().tangent == 1;
     tracked_block.truth_variance =
         truths[tracked_block.truth].sigma * truths[tracked_block.truth].sigma;
+    tracked_block.prior_sigma = internal::LargestPriorSigma(problem, id);
     tracked_block.error.resize(block.geometry().tangent);
     if (!tracked_block.unit.empty()) units[tracked_block.name] = tracked_block.unit;
     auto owner = std::find_if(owners.begin(), owners.end(),
@@ -343,17 +358,16 @@ void Metrics::Impl::CheckElement(Timestamp timestamp, TrackedBlock& block, int e
   if (outside_count < 0) return;
   const double error = std::abs(block.error[element]);
   // If sigma is zero, the filter assumes that the value is known.
-  const bool is_inside = sigma == 0.0 || error <= kInconsistentSigmas * sigma;
+  const bool is_inside = sigma == 0.0 || error <= kLostSigmas * sigma;
   outside_count = is_inside ? 0 : outside_count + 1;
-  if (outside_count < kInconsistentTimestamps) return;
+  if (outside_count < kLostTimestamps) return;
   outside_count = -1;
   const std::string unit = block.unit.empty() ? "" : ' ' + block.unit;
-  events.push_back({timestamp, EventKind::kInconsistent,
+  events.push_back({timestamp, EventKind::kLost,
                     block.elements[element] + ": the error, " + internal::RoundedText(error, 4) +
-                        unit + ", exceeded " + internal::NumberText(kInconsistentSigmas) +
-                        " sigma for " + std::to_string(kInconsistentTimestamps) +
-                        " timestamps in a row; sigma is " + internal::RoundedText(sigma, 4) +
-                        unit});
+                        unit + ", exceeded " + internal::NumberText(kLostSigmas) + " sigma for " +
+                        std::to_string(kLostTimestamps) + " timestamps in a row; sigma is " +
+                        internal::RoundedText(sigma, 4) + unit});
 }
 
 /// Adds the errors that ComputeErrors computed. `state` provides the covariance; null means that
@@ -386,7 +400,8 @@ void Metrics::Impl::AddNees(Owner& owner, std::size_t index,
   std::vector<internal::BlockError> errors;
   for (const std::size_t i : owner.blocks) {
     const TrackedBlock& block = tracked_blocks[i];
-    if (block.is_known) errors.push_back({block.id, &block.error, block.truth_variance});
+    if (block.is_known)
+      errors.push_back({block.id, &block.error, block.truth_variance, block.prior_sigma});
   }
   const auto [nees, dof] = internal::JointNees(state, errors);
   if (dof == 0 || std::isnan(nees)) return;
@@ -396,6 +411,8 @@ void Metrics::Impl::AddNees(Owner& owner, std::size_t index,
     sums->Add<OwnerSample>(&MetricInfo::owner, index, {nees, dof, bound->second});
   }
   owner.nees.Add(nees / dof);
+  owner.dof_sum += dof;
+  ++owner.count;
 }
 
 void Metrics::Impl::AddInnovation(std::size_t sensor, const MeasurementReport& measurement) {
@@ -414,7 +431,40 @@ void Metrics::Impl::AddInnovation(std::size_t sensor, const MeasurementReport& m
   }
 }
 
-void Metrics::Impl::AddReport(const std::vector<PeriodSums*>& destinations,
+/// Counts whether the measurement was used, and records its innovation.
+void Metrics::Impl::AddUse(std::size_t sensor, Timestamp timestamp,
+                           const MeasurementReport& measurement) {
+  SensorUse& use = uses[sensor];
+  const Outcome outcome = measurement.outcome;
+  if (outcome == Outcome::kAccepted || outcome == Outcome::kInitialised) {
+    ++use.used;
+    use.rejected_in_a_row = 0;
+  } else if (InfoOf(outcome).is_rejection) {
+    ++use.rejected;
+    const bool is_single = measurement.landmark < 0;  // landmarks are rejected individually
+    if (is_single && use.rejected_in_a_row++ == 0) use.rejected_since = timestamp;
+  }
+  innovations[sensor].Add(timestamp, measurement);
+}
+
+/// Updates the longest time without a used measurement.
+void Metrics::Impl::AddTimes(Timestamp timestamp, const UpdateReport& report) {
+  if (report.stale) return;
+  used.last_frame = timestamp;
+  const auto is_used = [](const MeasurementReport& measurement) {
+    return measurement.outcome == Outcome::kAccepted ||
+           measurement.outcome == Outcome::kInitialised;
+  };
+  if (std::ranges::none_of(report.measurements(), is_used)) return;
+  if (used.frames++ == 0) {
+    used.first = timestamp;
+  } else if (timestamp - used.last > used.longest.end - used.longest.start) {
+    used.longest = {used.last, timestamp};
+  }
+  used.last = timestamp;
+}
+
+void Metrics::Impl::AddReport(Timestamp timestamp, const std::vector<PeriodSums*>& destinations,
                               const UpdateReport& report) {
   ++report_count;
   if (has_landmarks) {
@@ -434,17 +484,18 @@ void Metrics::Impl::AddReport(const std::vector<PeriodSums*>& destinations,
     if (count == nullptr)
       count = &counts[MetricKey{ToString(measurement.outcome), sensors[sensor], ""}.text()];
     ++*count;
-    const bool is_compared =
-        measurement.outcome == Outcome::kAccepted || measurement.outcome == Outcome::kGated;
-    if (is_compared && measurement.dof > 0) AddInnovation(sensor, measurement);
-    if (measurement.outcome != Outcome::kAccepted || measurement.dof <= 0 ||
-        !std::isfinite(measurement.nis)) {
-      continue;
-    }
+    AddUse(sensor, timestamp, measurement);
+    const bool is_accepted = measurement.outcome == Outcome::kAccepted;
+    if ((!is_accepted && measurement.outcome != Outcome::kGated) || measurement.dof <= 0) continue;
+    AddInnovation(sensor, measurement);
+    if (!std::isfinite(measurement.nis)) continue;
+    const double log_det_s = internal::LogDeterminant(measurement.s, measurement.dof);
     for (PeriodSums* sums : destinations) {
-      sums->Add<SensorSample>(&MetricInfo::sensor, sensor, {measurement.nis, measurement.dof});
+      sums->Add<SensorSample>(&MetricInfo::sensor, sensor,
+                              {measurement.nis, measurement.dof, log_det_s, is_accepted});
     }
   }
+  AddTimes(timestamp, report);
   for (auto& [sensor, frames] : reprojection) {
     const double rms = internal::FrameInnovationOf(report, sensor).rms;
     if (std::isfinite(rms)) frames.push_back(rms);
@@ -528,6 +579,10 @@ Metrics::Metrics(const EstimatorSpec& spec, const std::vector<StreamInfo>& truth
     impl_->reprojection[static_cast<int>(s)] = {};
   }
   impl_->outcome_counts.resize(impl_->sensors.size());
+  for (const SensorBinding& sensor : spec.problem.sensors) {
+    impl_->uses.push_back({.sensor = sensor.name});
+    impl_->innovations.push_back(InnovationSeries(sensor));
+  }
   impl_->far_off_counts.resize(impl_->sensors.size());
   const bool is_filter = spec.estimator == nullptr || !spec.estimator->offline();
   for (const SensorBinding& sensor : spec.problem.sensors) {
@@ -553,11 +608,12 @@ void Metrics::Add(const SourceFrame& frame, const std::vector<bool>& in_segment,
     impl_->AddErrors(frame.timestamp, destinations, &state);
     impl_->AddImplied(frame.truth, destinations, report);
   }
-  impl_->AddReport(destinations, report);
+  impl_->AddReport(frame.timestamp, destinations, report);
 }
 
-void Metrics::AddReport(const std::vector<bool>& in_segment, const UpdateReport& report) {
-  impl_->AddReport(impl_->PeriodsOf(in_segment), report);
+void Metrics::AddReport(Timestamp timestamp, const std::vector<bool>& in_segment,
+                        const UpdateReport& report) {
+  impl_->AddReport(timestamp, impl_->PeriodsOf(in_segment), report);
 }
 
 void Metrics::AddDifference(Timestamp timestamp, const std::vector<std::vector<double>>& reference,
@@ -589,6 +645,34 @@ std::vector<int> Metrics::far_off_sensors() const {
 }
 
 const std::vector<Event>& Metrics::events() const { return impl_->events; }
+
+std::optional<Metrics::Gap> Metrics::longest_gap() const {
+  constexpr std::int64_t kMinFrames = 20;
+  const auto& used = impl_->used;
+  if (used.frames < kMinFrames) return std::nullopt;
+  Gap gap = used.longest;
+  if (used.last_frame - used.last > gap.end - gap.start) gap = {used.last, used.last_frame};
+  const double remaining_time = static_cast<double>(
+      (used.last - used.first) - (gap.start < used.last ? gap.end - gap.start : 0));
+  const double mean = remaining_time / static_cast<double>(used.frames - 1);
+  if (static_cast<double>(gap.end - gap.start) < kLongGap * mean) return std::nullopt;
+  return gap;
+}
+
+const std::vector<SensorUse>& Metrics::uses() const { return impl_->uses; }
+
+const std::vector<InnovationSeries>& Metrics::innovations() const { return impl_->innovations; }
+
+std::vector<NeesSeries> Metrics::nees() const {
+  std::vector<NeesSeries> series;
+  for (const Impl::Owner& owner : impl_->owners) {
+    if (owner.count == 0) continue;
+    series.push_back({owner.name,
+                      static_cast<double>(owner.dof_sum) / static_cast<double>(owner.count),
+                      owner.nees.values});
+  }
+  return series;
+}
 
 const std::map<std::string, std::int64_t>& Metrics::counts() const { return impl_->counts; }
 

@@ -4,10 +4,13 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "alidade/experiment/innovation_series.h"
 #include "alidade/experiment/run.h"
+#include "alidade/experiment/verdict.h"
 
 namespace alidade {
 
@@ -43,17 +46,17 @@ class Metrics {
   /// Adds the state after `frame`. `in_segment[i]` is true if the frame belongs to segment i.
   void Add(const SourceFrame& frame, const std::vector<bool>& in_segment, const State& state,
            const UpdateReport& report);
-  /// Adds the counts and the NIS of a frame, which do not need truth.
-  void AddReport(const std::vector<bool>& in_segment, const UpdateReport& report);
-  /// Adds the errors of an estimate relative to the reference estimator, which replaces truth.
-  /// These errors change only rmse, lag_ms and final_error. P does not bound these differences,
-  /// because both estimators use the same data. `reference` and `estimate` contain one value for
-  /// each block of the respective estimator's problem. An empty list means that the block has no
-  /// value.
+  /// Adds the part of a frame that needs no truth: counts and NIS.
+  void AddReport(Timestamp timestamp, const std::vector<bool>& in_segment,
+                 const UpdateReport& report);
+  /// Adds the errors of an estimate relative to the reference estimator, which replaces the truth:
+  /// rmse, lag_ms and final_error only. P does not bound these differences, because both estimators
+  /// use the same data. `reference` and `estimate` contain one value for each block of the
+  /// respective estimator's problem. The value is empty if the block has none.
   void AddDifference(Timestamp timestamp, const std::vector<std::vector<double>>& reference,
                      const std::vector<bool>& in_segment,
                      const std::vector<std::vector<double>>& estimate);
-  /// Returns the events `inconsistent`, at most one for each block element. Such an event means
+  /// Returns the events `lost`, at most one for each block element. Such an event means
   /// that the truth of the block is known, and the error of the element exceeded 10 sigma for 20
   /// timestamps in a row.
   const std::vector<Event>& events() const;
@@ -64,6 +67,20 @@ class Metrics {
   std::vector<int> far_off_sensors() const;
   /// Returns the names of the blocks whose truth the source declares, but which no frame contained.
   std::vector<std::string> blocks_without_truth() const;
+  /// Returns the longest time without a used measurement, between used measurements and up to the
+  /// last frame; nullopt unless it is at least kLongGap times the mean interval between frames with
+  /// a used measurement.
+  struct Gap {
+    Timestamp start, end;
+  };
+  static constexpr double kLongGap = 30.0;
+  std::optional<Gap> longest_gap() const;
+  /// Returns the use of the measurements of each sensor.
+  const std::vector<SensorUse>& uses() const;
+  /// Returns the innovations of each sensor.
+  const std::vector<InnovationSeries>& innovations() const;
+  /// Returns the NEES of each owner of blocks with truth.
+  std::vector<NeesSeries> nees() const;
   /// Returns all metrics by key.
   std::map<std::string, double> Finish() const;
   /// Returns all counts by key.

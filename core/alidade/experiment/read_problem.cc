@@ -34,16 +34,18 @@ void AddAt(const Node& entry, const Add& add) {
 
 /// Reads the value of a block: a number, a list, or {w: , x: , y: , z: } for a unit quaternion. A
 /// quaternion cannot be a list, because programs disagree about the order of its elements.
-std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
+std::vector<double> ReadMean(const Node& node, const Space& space) {
+  const Geometry& geometry = space.geometry;
   std::vector<double> mean;
   const bool double_cover = geometry.row().double_cover;
   if (double_cover) {
+    node.ExpectMap("{w: 1, x: 0, y: 0, z: 0}, the identity");
     for (const std::string& element : internal::SplitNames(geometry.row().elements)) {
       mean.push_back(node.At(element).Number());
     }
     node.RejectUnread();
   } else {
-    mean = node.Numbers(geometry.ambient);
+    mean = node.Numbers(geometry.ambient, space.unit);
   }
   if (DistanceFrom(geometry, mean.data()) > kUnitTolerance) {
     node.Fail("the value does not have unit length", "a length within 1e-3 of 1");
@@ -52,17 +54,29 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   return mean;
 }
 
+/// Returns the unit of the standard deviations of a block, or "" if its elements differ in units.
+std::string SigmaUnit(const Space& space) {
+  if (!space.parts.empty()) return {};
+  return space.geometry.tangent < space.geometry.ambient ? "rad" : space.unit;
+}
+
 /// Reads exactly one of `sigma` and `covariance`.
-Eigen::MatrixXd ReadCovariance(const Node& node, int size) {
+Eigen::MatrixXd ReadCovariance(const Node& node, const Space& space) {
+  const int size = space.geometry.tangent;
   const auto sigma = node.Find("sigma"), covariance = node.Find("covariance");
-  if (sigma.has_value() == covariance.has_value()) {
-    node.Fail("a block needs exactly one uncertainty", "either sigma or covariance");
+  if (!sigma && !covariance) {
+    node.RejectUnread();
+    node.Fail("the uncertainty of the initial value is missing",
+              "sigma, a standard deviation, or covariance, a matrix");
+  }
+  if (sigma && covariance) {
+    covariance->Fail("the uncertainty is also defined by `sigma`", "one of the two keys");
   }
   if (covariance) {
     const std::vector<double> values = internal::ReadCovariance(*covariance, size);
     return Eigen::Map<const Eigen::MatrixXd>(values.data(), size, size);
   }
-  std::vector<double> values = sigma->Numbers();
+  std::vector<double> values = sigma->Numbers(-1, SigmaUnit(space));
   if (values.size() == 1) values.assign(static_cast<std::size_t>(size), values[0]);
   if (values.size() != static_cast<std::size_t>(size)) {
     sigma->Fail("the list has " + std::to_string(values.size()) + " numbers",
@@ -116,19 +130,28 @@ std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& mo
   return names;
 }
 
+/// Returns an example of the initial value of a block, for messages.
+std::string InitialExample(const Space& space) {
+  if (space.geometry.row().double_cover) return "{mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0.1}";
+  std::string mean = "0";
+  for (int i = 1; i < space.geometry.ambient; ++i) mean += ", 0";
+  return "{mean: " + (space.geometry.ambient > 1 ? '[' + mean + ']' : mean) + ", sigma: 0.1}";
+}
+
 /// Reads the initial value of the block `name` of the problem. `space` describes the block in the
 /// model.
 InitialValue ReadInitial(const Node& initial, const Space& space, const std::string& name,
                          BlockStatus status) {
+  initial.ExpectMap(InitialExample(space));
   InitialValue value = InitialValue::Constant(space.name, {});
   value.name = name;
   value.status = status;
   if (const auto sensor = initial.Find("from_measurement")) {
     value.sensor = sensor->Text();
   } else {
-    value.mean = ReadMean(initial.At("mean", "the initial value"), space.geometry);
+    value.mean = ReadMean(initial.At("mean", "the initial value", InitialExample(space)), space);
     if (status != BlockStatus::kConstant) {
-      value.covariance = ReadCovariance(initial, space.geometry.tangent);
+      value.covariance = ReadCovariance(initial, space);
     } else {
       for (const char* key : {"sigma", "covariance"}) initial.Declare(key);
     }
@@ -149,10 +172,8 @@ InputBinding ReadInput(const Node& entry, const MotionModel& model) {
   }
   const std::string needed_by =
       "the control input " + model.input().name + " of model " + model.name();
-  const Node input = entry.At("input", needed_by);
-  if (!input.is_map()) {
-    input.Fail("the value is not a map", "{stream: NAME}, or {stream: NAME, timeout_s: S}");
-  }
+  const Node input = entry.At("input", needed_by, "input: {stream: NAME}");
+  input.ExpectMap("{stream: NAME}, or {stream: NAME, timeout_s: S}");
   binding.stream = input.At("stream", needed_by).Text();
   if (const auto timeout = input.Find("timeout_s")) {
     binding.timeout_s = timeout->Number(0.0, kMaxSeconds, true);
@@ -174,7 +195,11 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
         .Fail("block '" + block + "' is also in `consider`",
               "the block in only one of `constant` (exact) and `consider` (uncertain)");
   }
-  const Node initial = entry.At("initial", "the state entry '" + name + "'");
+  const std::string example = "{" + names[0] + ": " + InitialExample(model->blocks()[0]) + '}';
+  const Node initial = entry.At("initial", "the state entry '" + name + "'", "initial: " + example);
+  initial.ExpectMap(example);
+  for (const std::string& block : names) initial.Declare(block);
+  initial.RejectUnread();
   std::vector<InitialValue> values;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const Space& space = model->blocks()[i];
@@ -187,10 +212,10 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
     const BlockStatus status = Contains(constant, names[i])     ? BlockStatus::kConstant
                                : Contains(considered, names[i]) ? BlockStatus::kConsider
                                                                 : BlockStatus::kEstimated;
-    const Node node = initial.At(names[i], "block '" + name + "." + names[i] + "'");
+    const Node node = initial.At(names[i], "block '" + name + "." + names[i] + "'",
+                                 names[i] + ": " + InitialExample(space));
     values.push_back(ReadInitial(node, space, names[i], status));
   }
-  initial.RejectUnread();
   entry.RejectUnread();
   AddAt(entry, [&] { problem.AddState(name, model, values, input); });
 }
@@ -351,22 +376,46 @@ class OwnedStateReader {
   std::vector<std::string> considered_, constant_;
 };
 
-BlockId FindBlock(const Node& node, const Problem& problem) {
+/// Returns a text that lists the blocks which `role` can be bound to: those of its geometry whose
+/// unit does not differ.
+std::string BlocksFor(const Space& role, const Problem& problem) {
+  std::vector<std::string> names;
+  for (const Block& block : problem.layout.blocks()) {
+    const bool is_unit_equal = block.space.unit.empty() || block.space.unit == role.unit;
+    if (block.geometry() == role.geometry && is_unit_equal) names.push_back(block.name);
+  }
+  if (names.empty()) return "a block of `state`, in the form ENTRY.BLOCK";
+  return (names.size() > 1 ? "one of " : "") + internal::Join(names);
+}
+
+BlockId FindBlock(const Node& node, const Space& role, const Problem& problem) {
   const std::string name = node.Text();
   const BlockId id = problem.layout.Find(name);
   if (id >= 0) return id;
-  const std::vector<std::string> names = NamesOf(problem.layout.blocks());
-  node.Fail("block '" + name + "' does not exist", "a block of `state`, in the form ENTRY.BLOCK",
-            Nearest(name, names));
+  node.Fail("block '" + name + "' does not exist", BlocksFor(role, problem),
+            Nearest(name, NamesOf(problem.layout.blocks())));
+}
+
+/// Rejects a block whose geometry or unit differs from that of the role. A unit that the model does
+/// not declare is not checked.
+void CheckBlock(const Node& node, const Block& block, const Space& role, const SensorModel& model) {
+  const std::string of_role = " for role '" + role.name + "' of model '" + model.name() + "'";
+  if (!(block.geometry() == role.geometry)) {
+    node.Fail("block '" + block.name + "' has geometry " + ToString(block.geometry()),
+              ToString(role.geometry) + of_role);
+  }
+  const std::string& unit = block.space.unit;
+  if (unit.empty() || role.unit.empty() || unit == role.unit) return;
+  node.Fail("block '" + block.name + "' has the unit " + unit, role.unit + of_role);
 }
 
 RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& model,
                      const Problem& problem) {
   RoleBinding binding;
   if (!node.is_map()) {
-    binding.block = FindBlock(node, problem);
+    binding.block = FindBlock(node, role, problem);
   } else {
-    binding.block = FindBlock(node.At("block", "a role"), problem);
+    binding.block = FindBlock(node.At("block", "a role"), role, problem);
     if (const auto mode = node.Find("mode")) {
       binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "known"}));
     }
@@ -375,12 +424,7 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
     }
     node.RejectUnread();
   }
-  const Block& block = problem.layout[binding.block];
-  if (!(block.geometry() == role.geometry)) {
-    node.Fail(
-        "block '" + block.name + "' has geometry " + ToString(block.geometry()),
-        ToString(role.geometry) + " for role '" + role.name + "' of model '" + model.name() + "'");
-  }
+  CheckBlock(node, problem.layout[binding.block], role, model);
   return binding;
 }
 
@@ -410,7 +454,10 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
   SensorOptions options{.stream = entry.At("stream", "sensor '" + name + "'").Text()};
   const SharedSensor model = host.CreateSensor(model_name, entry);
   if (const auto loss = entry.Find("loss")) options.loss = ReadLoss(*loss);
-  const Node roles = entry.At("roles", "sensor '" + name + "'");
+  const Node roles = entry.At("roles", "sensor '" + name + "'", "roles: {ROLE: ENTRY.BLOCK}");
+  roles.ExpectMap("{ROLE: ENTRY.BLOCK}");
+  for (const Space& role : model->roles()) roles.Declare(role.landmark() ? "landmark" : role.name);
+  roles.RejectUnread();
   OwnedStateReader owned_states(name, entry, roles, *model);
   std::vector<RoleBinding> bindings;
   for (std::size_t i = 0; i < model->roles().size(); ++i) {
@@ -423,7 +470,8 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
       bindings.emplace_back();
       continue;
     }
-    const Node role_node = node ? *node : roles.At(role.name, "model '" + model_name + "'");
+    const Node role_node =
+        node ? *node : roles.At(role.name, "model '" + model_name + "'", BlocksFor(role, problem));
     bindings.push_back(ReadRole(role_node, role, *model, problem));
     const BlockId block = bindings.back().block;
     if (std::ranges::count(bindings, block, &RoleBinding::block) > 1) {
@@ -434,7 +482,6 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
   if (model->has_landmark()) internal::ReadLandmarkKeys(name, entry, *model, host, options);
   AddAt(entry, [&] { problem.AddSensor(name, model, bindings, options); });
   owned_states.AddTimeOffset(problem, problem.sensors.back());
-  roles.RejectUnread();
   owned_states.RejectUnread();
   entry.RejectUnread();
 }
@@ -495,7 +542,10 @@ Problem SelectSensors(Problem problem, const std::vector<std::string>& names) {
 Problem ReadProblem(const Node& root, const PluginHost& host,
                     const std::vector<std::string>& sensor_names) {
   Problem problem;
-  for (const auto& [name, entry] : root.At("state", "a run").Entries()) {
+  constexpr const char* kState = "NAME: {model: constant, initial: {value: {mean: 0, sigma: 1}}}";
+  const Node state = root.At("state", "a run", kState);
+  state.ExpectMap(kState);
+  for (const auto& [name, entry] : state.Entries()) {
     internal::ExpectName(name, entry, "a state entry");
     if (name == "landmarks") {
       entry.Fail("'landmarks' cannot name a state entry, because landmark blocks use this name",
@@ -503,7 +553,11 @@ Problem ReadProblem(const Node& root, const PluginHost& host,
     }
     ReadStateEntry(name, entry, host, problem);
   }
-  for (const auto& [name, entry] : root.At("sensors", "a run").Entries()) {
+  constexpr const char* kSensors =
+      "NAME: {model: MODEL, stream: STREAM, roles: {ROLE: ENTRY.BLOCK}}";
+  const Node sensors = root.At("sensors", "a run", kSensors);
+  sensors.ExpectMap(kSensors);
+  for (const auto& [name, entry] : sensors.Entries()) {
     internal::ExpectName(name, entry, "a sensor");
     ReadSensor(name, entry, host, problem);
   }

@@ -7,7 +7,7 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/experiment/accepted_data.h"
-#include "alidade/experiment/diagnosis.h"
+#include "alidade/experiment/complete_result.h"
 #include "alidade/experiment/estimator_run.h"
 #include "alidade/experiment/frame_check.h"
 #include "alidade/experiment/frame_order.h"
@@ -303,7 +303,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
   for (EstimatorRun& run : runs) {
     run_guarded([&] {
       ComputeMetrics(run, result);
-      internal::Diagnose(experiment, run);
+      internal::CompleteResult(experiment, run);
     });
     result.estimators.push_back(std::move(run.result));
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "alidade/experiment/experiment.h"
+#include "alidade/experiment/verdict.h"
 
 namespace alidade {
 
@@ -38,9 +39,11 @@ struct EstimatorResult {
   std::map<std::string, std::int64_t> counts;  ///< counts by key, such as `accepted:stereo`
   /// Unit of each block that has a unit, such as {"target.depth", "m"}.
   std::map<std::string, std::string> units;
-  bool diverged = false;      ///< whether the estimator reported that it diverged
-  bool inconsistent = false;  ///< whether an event `inconsistent` occurred
-  bool failed = false;        ///< whether the estimator diverged, or could not continue
+  bool diverged = false;  ///< whether the estimator reported that it diverged
+  bool failed = false;    ///< whether it diverged, or could not continue
+  Verdict verdict;
+  bool expects_poor = false;      ///< whether the config expects poor estimates (`expect: poor`)
+  std::vector<Finding> findings;  ///< about the innovations of its sensors
   std::vector<Event> events;
   std::vector<std::vector<std::string>> unobservable;
   /// Final map, for `landmarks.csv`; nullopt if the estimator has no landmarks.
@@ -70,8 +73,15 @@ struct RunResult {
   std::vector<EstimatorResult> estimators;
 };
 
-/// Observer of a run. All calls occur on the thread of the run. If the observer throws an
-/// exception, the run ends with this exception as its reason.
+/// Returns the worst verdict of the estimators from which the config does not expect poor
+/// estimates; nullopt if the config expects this of all.
+std::optional<VerdictState> WorstVerdict(const RunResult& result);
+/// Returns a line for each estimator with its verdict and the reason, and a line for each finding
+/// about its innovations.
+std::string VerdictText(const RunResult& result);
+
+/// Observer of a run, called on the thread of the run. If the observer throws an exception, the run
+/// ends with this exception as its reason.
 class RunObserver {
  public:
   virtual ~RunObserver() = default;

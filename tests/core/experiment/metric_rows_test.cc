@@ -34,10 +34,11 @@ TEST(ComparisonTable, OrdersScalesAndAligns) {
                                        {"final_error:target.depth", 1.0}}),
                        Named("stereo_only", {{"rmse:target.depth", 0.206534}})};
   result.estimators[0].counts = {{"accepted:stereo", 74}, {"gated:stereo", 1}};
-  result.estimators[1].diverged = true;
-  result.estimators[0].inconsistent = true;
+  result.estimators[1].verdict.state = VerdictState::kDiverged;
+  result.estimators[0].verdict.state = VerdictState::kLost;
   EXPECT_EQ(ComparisonTable(result),
             "                                     fused  stereo_only\n"
+            "verdict                               lost     diverged\n"
             "rmse cam.pixel [px]                 0.3100            -\n"
             "rmse target.depth [mm]               2.145        206.5\n"
             "rmse target.depth @blind [mm]        1.210            -\n"
@@ -48,9 +49,7 @@ TEST(ComparisonTable, OrdersScalesAndAligns) {
             "nees.within95 target [%]             100.0            -\n"
             "nis.mean stereo                     0.9059            -\n"
             "accepted stereo                         74            -\n"
-            "gated stereo                             1            -\n"
-            "diverged                                no          yes\n"
-            "inconsistent                           yes           no\n");
+            "gated stereo                             1            -\n");
 }
 
 TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
@@ -61,7 +60,8 @@ TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
     result.estimators.push_back(Named(name, {{"rmse:cam.pixel", rmse}}));
   }
   const std::string table = ComparisonTable(result);
-  EXPECT_NE(table.find("rmse cam.pixel [px]  0.00001950   0  250.0  3.000e+12  4.000e-07  inf\n"),
+  EXPECT_NE(table.find("rmse cam.pixel [px]  0.00001950           0       250.0   3.000e+12   "
+                       "4.000e-07         inf\n"),
             std::string::npos)
       << table;
 }
@@ -72,19 +72,18 @@ TEST(ComparisonTable, KeepsOneUnitThroughoutTheTable) {
                                      {"rmse:target.depth@blind", 1.2},
                                      {"rmse:target.depth@seeing", 0.004}})};
   EXPECT_EQ(ComparisonTable(result),
-            "                                    ekf\n"
-            "rmse target.depth [m]            0.9000\n"
-            "rmse target.depth @blind [m]      1.200\n"
-            "rmse target.depth @seeing [m]  0.004000\n"
-            "diverged                             no\n"
-            "inconsistent                         no\n");
+            "                                      ekf\n"
+            "verdict                        not tested\n"
+            "rmse target.depth [m]              0.9000\n"
+            "rmse target.depth @blind [m]        1.200\n"
+            "rmse target.depth @seeing [m]    0.004000\n");
 }
 
 TEST(ComparisonTable, SmallNumbersKeepTheirDigits) {
   RunResult result;
   result.estimators = {Named("a", {{"nees.mean:target", 3.21e-6}}),
                        Named("b", {{"nees.mean:target", 4.5e-6}})};
-  EXPECT_NE(ComparisonTable(result).find("nees.mean target  3.210e-06  4.500e-06\n"),
+  EXPECT_NE(ComparisonTable(result).find("nees.mean target   3.210e-06   4.500e-06\n"),
             std::string::npos)
       << ComparisonTable(result);
 }
@@ -97,7 +96,7 @@ TEST(ComparisonTable, LeavesOutWhatIsHeldAtTruth) {
                                    {"nees.within95:target", 1.0}}),
                        Named("b", {})};
   EXPECT_EQ(ComparisonTable(result),
-            "               a   b\ndiverged      no  no\ninconsistent  no  no\n");
+            "                  a           b\nverdict  not tested  not tested\n");
   result.estimators[1].metrics = {{"rmse:target.depth", 0.1}};  // estimator b estimates this block
   EXPECT_NE(ComparisonTable(result).find("rmse target.depth"), std::string::npos);
 }
@@ -120,9 +119,9 @@ TEST(ComparisonTable, FoldsWhatIsWiderThanALine) {
   EXPECT_GT(widest, 60);
 }
 
-// The table must contain the two rows of health, all five rows of the first round and three rows of
+// The table must contain the row of the verdict, all five rows of the first round and four rows of
 // the second round. In all there are 9 rows of blocks, 6 of segments (without lag), 4 means, 3
-// counts and 2 rows of health. Of these 24 rows, 14 are omitted.
+// counts and the verdict. Of these 23 rows, 13 are omitted.
 TEST(MainRows, AreDealtOutInTheOrderOfTheConfig) {
   RunResult result;
   std::map<std::string, double> metrics;
@@ -140,11 +139,11 @@ TEST(MainRows, AreDealtOutInTheOrderOfTheConfig) {
                                              "cam.velocity", "right", "left"};
   std::vector<std::string> labels;
   for (const auto& row : internal::MainRows(result, subjects)) labels.push_back(row.label);
-  EXPECT_EQ(labels, (std::vector<std::string>{"rmse cam.heading [mrad]", "rmse cam.position",
-                                              "coverage95 cam.position [%]", "nees.mean cam",
-                                              "nees.mean map", "nis.mean left", "nis.mean right",
-                                              "accepted right", "diverged", "inconsistent"}));
-  EXPECT_NE(internal::MainTable(result, subjects).find("\n14 more rows: --all\n"),
+  EXPECT_EQ(labels, (std::vector<std::string>{
+                        "verdict", "rmse cam.heading [mrad]", "rmse cam.position",
+                        "coverage95 cam.position [%]", "nees.mean cam", "nees.mean map",
+                        "nis.mean left", "nis.mean right", "accepted left", "accepted right"}));
+  EXPECT_NE(internal::MainTable(result, subjects).find("\n13 more rows: --all\n"),
             std::string::npos)
       << internal::MainTable(result, subjects);
 }
@@ -182,7 +181,7 @@ TEST(MetricRows, LabelACountWithoutASubjectByItsName) {
 TEST(MainRows, AreAllOfThemWhereTheyAreNoMoreThanTen) {
   RunResult result;
   result.estimators = {Named("ekf", {{"rmse:target.depth", 0.5}, {"lag_ms:target.depth", 1.0}})};
-  EXPECT_EQ(internal::MainRows(result, {}).size(), 4u);
+  EXPECT_EQ(internal::MainRows(result, {}).size(), 3u);
   EXPECT_EQ(internal::MainTable(result, {}), ComparisonTable(result));
 }
 
@@ -194,6 +193,38 @@ TEST(MarkdownTable, KeepsWhatWouldEndACell) {
 }
 
 TEST(ComparisonTable, WithoutEstimatorsIsEmpty) { EXPECT_EQ(ComparisonTable({}), ""); }
+
+/// Returns an estimator with the verdict `lost` and findings with the given texts.
+EstimatorResult WithFindings(const std::string& name, const std::vector<std::string>& texts) {
+  EstimatorResult estimator;
+  estimator.name = name;
+  estimator.verdict = {.state = VerdictState::kLost, .because = "far off"};
+  for (const std::string& text : texts) {
+    estimator.findings.push_back({FindingKind::kBias, "gnss", text, 0.0});
+  }
+  return estimator;
+}
+
+TEST(VerdictText, ShowsThreeFindingsAndCountsTheOthers) {
+  RunResult result;
+  result.estimators = {WithFindings("ekf", {"one"})};
+  EXPECT_EQ(VerdictText(result), "ekf  lost: far off\n     one\n");
+  result.estimators = {WithFindings("ekf", {"one", "far off", "two", "three", "four"})};
+  EXPECT_EQ(
+      VerdictText(result),
+      "ekf  lost: far off\n     one\n     two\n     three\n"
+      "     the first of these findings usually explains the others; `alidade diagnose` lists "
+      "1 more\n");
+}
+
+TEST(VerdictText, DoesNotRepeatTheFindingsOfAnEarlierEstimator) {
+  RunResult result;
+  result.estimators = {WithFindings("ekf", {"one"}), WithFindings("ukf", {"two"}),
+                       WithFindings("rts", {"one"}), WithFindings("lag", {})};
+  EXPECT_EQ(VerdictText(result),
+            "ekf  lost: far off\n     one\nukf  lost: far off\n     two\n"
+            "rts  lost: far off\n     the same findings as for ekf\nlag  lost: far off\n");
+}
 
 }  // namespace
 }  // namespace alidade

@@ -350,7 +350,7 @@ TEST(Metrics, TellsOnceOfErrorsBeyondTenSigma) {
   for (int i = 0; i < 40; ++i) one.Add({{20.1}});
   ASSERT_EQ(one.metrics().events().size(), 1u);
   const Event& event = one.metrics().events()[0];
-  EXPECT_EQ(event.kind, EventKind::kInconsistent);
+  EXPECT_EQ(event.kind, EventKind::kLost);
   EXPECT_EQ(event.timestamp, 39 * Timestamp{100'000'000});
   EXPECT_EQ(event.text,
             "a.x: the error, 21 m, exceeded 10 sigma for 20 timestamps in a row; sigma is 2 m");
@@ -381,7 +381,7 @@ TEST(Metrics, AMeasuredTruthTellsOfAFilterThatIsTooSure) {
   // The error grows to 1 m at the 20th timestamp.
   for (int i = 0; i < 60; ++i) one.Add({{0.05 * i}});
   ASSERT_EQ(one.metrics().events().size(), 1u);
-  EXPECT_EQ(one.metrics().events()[0].kind, EventKind::kInconsistent);
+  EXPECT_EQ(one.metrics().events()[0].kind, EventKind::kLost);
 }
 
 TEST(Metrics, AKnownValueIsNotInconsistent) {

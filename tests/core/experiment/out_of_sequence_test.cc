@@ -203,8 +203,8 @@ TEST(OutOfSequencePolicy, IsReadStrictly) {
   EXPECT_EQ(policy.window, 250'000'000);
   EXPECT_NE(Explain(config, experiment)
                 .find("out-of-sequence frames: rollback: the estimators return to an earlier "
-                      "state and process all frames in order, up to "
-                      "0.25 s behind"),
+                      "state and process all frames in order; a frame may be "
+                      "up to 0.25 s older than the newest frame"),
             std::string::npos);
   std::map<std::string, int> ranks;
   for (std::size_t s = 0; s < policy.ranks.size(); ++s) {

@@ -272,38 +272,40 @@ std::vector<std::string> TextsOf(const EstimatorResult& result, EventKind kind) 
   return texts;
 }
 
-TEST(Run, AnOverconfidentFilterIsAnEvent) {
-  const EstimatorResult result = WalkWith(0.13);
-  EXPECT_GT(result.metrics.at("nees.mean:p"), 30.0);
-  ASSERT_EQ(TextsOf(result, EventKind::kNeesBounds).size(), 1u);
-  const std::string nees = TextsOf(result, EventKind::kNeesBounds)[0];
-  EXPECT_TRUE(nees.starts_with("the mean NEES of p is ")) << nees;
-  EXPECT_NE(nees.find(", outside the 95 % bounds ["), std::string::npos) << nees;
-  EXPECT_TRUE(nees.ends_with("]: the filter is overconfident")) << nees;
-  ASSERT_EQ(TextsOf(result, EventKind::kNisBounds).size(), 1u);
-  const std::string nis = TextsOf(result, EventKind::kNisBounds)[0];
-  EXPECT_TRUE(nis.starts_with("the mean NIS of sensor disparity is ")) << nis;
-  EXPECT_NE(nis.find(", outside the 95 % bounds ["), std::string::npos) << nis;
+/// Returns whether the mean NEES or NIS of a subject is outside its 95 % bounds.
+bool IsOutside(const EstimatorResult& result, const std::string& name, const std::string& subject) {
+  const auto value = [&](const char* part) { return result.metrics.at(name + part + subject); };
+  return value(".mean:") < value(".low:") || value(".mean:") > value(".high:");
 }
 
-TEST(Run, AnUnderconfidentFilterIsAnEvent) {
-  const std::vector<std::string> texts = TextsOf(WalkWith(4.0), EventKind::kNisBounds);
-  ASSERT_EQ(texts.size(), 1u);
-  EXPECT_TRUE(texts[0].ends_with("]: the filter is underconfident")) << texts[0];
+TEST(Run, TheVerdictOnAnOverconfidentFilterGivesItsNees) {
+  const EstimatorResult result = WalkWith(0.13);
+  EXPECT_GT(result.metrics.at("nees.mean:p"), 30.0);
+  EXPECT_EQ(result.verdict.state, VerdictState::kOverconfident);
+  EXPECT_TRUE(result.verdict.because.starts_with("the NEES of p is ")) << result.verdict.because;
+  ASSERT_FALSE(result.findings.empty());
+  EXPECT_TRUE(IsOutside(result, "nees", "p"));
+}
+
+TEST(Run, TheVerdictOnAnUnderconfidentFilterIsByItsInnovations) {
+  const EstimatorResult result = WalkWith(4.0);
+  EXPECT_EQ(result.verdict.state, VerdictState::kUnderconfident);
+  EXPECT_TRUE(IsOutside(result, "nis", "disparity"));
 }
 
 // Of the 200 runs, 10 (5 %) are expected outside the bounds, with a standard deviation of 3. The
 // bounds of the NEES are wider.
 TEST(Run, AConsistentFilterIsRarelyOutsideItsBounds) {
-  std::size_t nees = 0, nis = 0;
+  int nees = 0, nis = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     const EstimatorResult result = WalkWith(1.0, seed);
-    nees += TextsOf(result, EventKind::kNeesBounds).size();
-    nis += TextsOf(result, EventKind::kNisBounds).size();
+    EXPECT_EQ(result.verdict.state, VerdictState::kConsistent) << result.verdict.because;
+    nees += IsOutside(result, "nees", "p") ? 1 : 0;
+    nis += IsOutside(result, "nis", "disparity") ? 1 : 0;
   }
-  EXPECT_LE(nees, 20u);
-  EXPECT_LE(nis, 20u);
-  EXPECT_GE(nis, 2u);
+  EXPECT_LE(nees, 20);
+  EXPECT_LE(nis, 20);
+  EXPECT_GE(nis, 2);
 }
 
 /// Measures a heading: z = x + n.
@@ -393,6 +395,20 @@ TEST(Run, RadiansAreNoEvent) {
       }
     }
   }
+}
+
+TEST(Run, ARoleWithAnotherUnitThanItsBlockIsAnEvent) {
+  Experiment experiment = MakeExperiment();
+  EstimatorSpec& ekf = experiment.estimators[0];
+  SensorBinding& scale = ekf.problem.sensors[1];
+  ASSERT_EQ(scale.roles.size(), 2u);
+  EXPECT_EQ(TextsOf(alidade::Run(experiment, {}).estimators[0], EventKind::kUnit).size(), 0u);
+  std::swap(scale.roles[0], scale.roles[1]);
+  ekf.estimator = std::make_unique<Ekf>(ekf.problem, EkfOptions{}, experiment.source->streams());
+  const std::vector<std::string> texts =
+      TextsOf(alidade::Run(experiment, {}).estimators[0], EventKind::kUnit);
+  ASSERT_GE(texts.size(), 1u);
+  EXPECT_TRUE(texts[0].ends_with("; were two roles exchanged?")) << texts[0];
 }
 
 TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {

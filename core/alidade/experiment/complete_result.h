@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "alidade/experiment/estimator_run.h"
+
+namespace alidade::internal {
+
+/// Completes the result of `run` except for the metrics. Adds the counts, the units, the map, the
+/// findings, the verdict, and events about the whole run, such as a sensor that was never used.
+void CompleteResult(const Experiment& experiment, EstimatorRun& run);
+
+}  // namespace alidade::internal

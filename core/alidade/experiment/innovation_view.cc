@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/innovation_view.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "alidade/base/statistics.h"
+
+namespace alidade::internal {
+namespace {
+
+Eigen::VectorXd Centred(std::span<const double> values) {
+  const Eigen::VectorXd x = Eigen::VectorXd::Map(values.data(), std::ssize(values));
+  return x.array() - x.mean();
+}
+
+}  // namespace
+
+InnovationView::InnovationView(const InnovationSeries& series) : series_(&series) {
+  constexpr double kChanceShare = 0.05;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const bool is_new = i > 0 && series.timestamps[i] != series.timestamps[i - 1];
+    frames_.push_back(i == 0 ? 0 : frames_.back() + (is_new ? 1 : 0));
+    if (!is_accepted(i)) rejected_.push_back(i);
+  }
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (is_accepted(i) || rejected_share() >= kChanceShare) tested_.push_back(i);
+  }
+  if (size() > 0) FindOutliers();
+  for (const std::size_t i : tested_) {
+    if (!has_outliers_ || nis(i) <= outlier_nis_) core_.push_back(i);
+  }
+}
+
+double InnovationView::rejected_share() const {
+  return static_cast<double>(rejected_.size()) /
+         static_cast<double>(std::max<std::size_t>(size(), 1));
+}
+
+/// Compares the number of frames with an outlier with a Poisson distribution. The probability of k
+/// or more frames, of which f are expected, is P(chi2(2 k) <= 2 f).
+void InnovationView::FindOutliers() {
+  constexpr double kTail = 1e-4, kFalseAlarm = 1e-6, kMinShare = 0.004;
+  constexpr std::size_t kMinFrames = 3;
+  const double median_ratio = Median(series_->nis) / ChiSquareQuantile(0.5, series_->dof);
+  outlier_nis_ = ChiSquareQuantile(1.0 - kTail, series_->dof) *
+                 std::max(median_ratio, std::numeric_limits<double>::min());
+  Rows outliers;
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (nis(i) > outlier_nis_) outliers.push_back(i);
+  }
+  outlier_share_ = static_cast<double>(outliers.size()) / static_cast<double>(size());
+  const std::size_t count = SumFrames(*this, outliers, [](std::size_t) { return 1.0; }).size();
+  if (count < kMinFrames || outlier_share_ <= kMinShare) return;
+  const auto frames = static_cast<double>(frame_count());
+  const double per_frame = static_cast<double>(size()) / frames;
+  const double expected = frames * (1.0 - std::pow(1.0 - kTail, per_frame));
+  has_outliers_ = 2.0 * expected < ChiSquareQuantile(kFalseAlarm, 2.0 * static_cast<double>(count));
+}
+
+double InnovationView::expected_nis() const {
+  if (rejected_.empty() || tested_.size() == size()) return 1.0;
+  double largest_accepted = 0.0, smallest_rejected = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (is_accepted(i)) {
+      largest_accepted = std::max(largest_accepted, nis(i));
+    } else {
+      smallest_rejected = std::min(smallest_rejected, nis(i));
+    }
+  }
+  const double cut = std::max(largest_accepted, smallest_rejected);
+  return cut > 0.0 ? TruncatedMean(series_->dof, cut) : 1.0;
+}
+
+double Median(std::vector<double> values) {
+  std::ranges::sort(values);
+  return Quantile(values, 0.5);
+}
+
+double Mean(std::span<const double> values) {
+  return Eigen::VectorXd::Map(values.data(), std::ssize(values)).mean();
+}
+
+double SquaredDeviation(std::span<const double> values) { return Centred(values).squaredNorm(); }
+
+double LagOneCorrelation(std::span<const double> values) {
+  const Eigen::VectorXd x = Centred(values);
+  const Eigen::Index n = x.size();
+  const double square = x.squaredNorm();
+  return square > 0.0 ? x.head(n - 1).dot(x.tail(n - 1)) / square : 0.0;
+}
+
+double CorrelationTime(std::span<const double> values) {
+  constexpr Eigen::Index kMinSize = 8, kMaxLag = 200;
+  const Eigen::VectorXd x = Centred(values);
+  const Eigen::Index n = x.size();
+  const double square = x.squaredNorm(), noise = 2.0 / std::sqrt(static_cast<double>(n));
+  double tau = 1.0;
+  if (n < kMinSize || !(square > 0.0)) return tau;
+  for (Eigen::Index k = 1; k < std::min(n / 3, kMaxLag); ++k) {
+    const double rho = x.head(n - k).dot(x.tail(n - k)) / square;
+    if (!(rho >= noise)) break;
+    tau += 2.0 * rho;
+  }
+  return tau;
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "alidade/experiment/innovation_series.h"
+
+/// Statistics that the rules of Diagnose share. The measurements of a frame, which have the same
+/// timestamp, depend on the same prediction. The statistics therefore count frames, not
+/// measurements.
+namespace alidade::internal {
+
+/// Indices of measurements, in ascending order.
+using Rows = std::vector<std::size_t>;
+
+/// Sum over the measurements of a frame.
+struct FrameSum {
+  std::size_t frame;
+  double sum = 0.0;
+  double count = 0.0;
+
+  double mean() const { return sum / count; }
+};
+
+/// Innovations of one sensor, prepared for the rules.
+class InnovationView {
+ public:
+  /// `series` must outlive the view.
+  explicit InnovationView(const InnovationSeries& series);
+
+  const InnovationSeries& series() const { return *series_; }
+  std::size_t size() const { return series_->size(); }
+  std::size_t dof() const { return static_cast<std::size_t>(series_->dof); }
+  bool is_accepted(std::size_t i) const { return series_->accepted[i] != 0; }
+  double time_s(std::size_t i) const { return Seconds(series_->timestamps[i]); }
+  double nis(std::size_t i) const { return series_->nis[i]; }
+  /// Return element k of r, of sqrt(S_kk), and of u = r / sqrt(S_kk) of measurement i.
+  double r(std::size_t i, std::size_t k) const { return series_->innovation[i * dof() + k]; }
+  double s(std::size_t i, std::size_t k) const { return series_->sigma[i * dof() + k]; }
+  double u(std::size_t i, std::size_t k) const { return r(i, k) / s(i, k); }
+  /// Returns whether an element of z and h corresponds to element k of r.
+  bool has_z(std::size_t k) const { return series_->z_index[k] >= 0; }
+  /// Return the elements of z and h that correspond to element k of r, and their unit.
+  double z(std::size_t i, std::size_t k) const { return series_->z[i * ambient() + z_index(k)]; }
+  double h(std::size_t i, std::size_t k) const { return series_->h[i * ambient() + z_index(k)]; }
+  const std::string& unit(std::size_t k) const { return series_->units[z_index(k)]; }
+
+  /// Returns the index of the frame of measurement i. frame_count() is the number of frames.
+  std::size_t frame(std::size_t i) const { return frames_[i]; }
+  std::size_t frame_count() const { return frames_.empty() ? 0 : frames_.back() + 1; }
+
+  /// Rejected measurements, and their share.
+  const Rows& rejected() const { return rejected_; }
+  double rejected_share() const;
+  /// Measurements of the statistical tests. If at least 5 % were rejected, rejections are not due
+  /// to chance; the tests then use the rejected measurements too.
+  const Rows& tested() const { return tested_; }
+  /// Tested measurements without outliers.
+  const Rows& core() const { return core_; }
+
+  /// Threshold of an outlier: the NIS that a Gaussian innovation exceeds with probability 1e-4,
+  /// scaled by the median NIS.
+  double outlier_nis() const { return outlier_nis_; }
+  /// Returns the share of measurements beyond this threshold.
+  double outlier_share() const { return outlier_share_; }
+  /// Returns whether there are more outliers than chance explains.
+  bool has_outliers() const { return has_outliers_; }
+
+  /// Returns the mean of NIS / dof of a consistent filter over the core. It is below 1 if the gate
+  /// truncates the distribution. The threshold of the gate is unknown; it is between the largest
+  /// accepted and the smallest rejected NIS.
+  double expected_nis() const;
+
+ private:
+  std::size_t ambient() const { return static_cast<std::size_t>(series_->ambient); }
+  std::size_t z_index(std::size_t k) const { return static_cast<std::size_t>(series_->z_index[k]); }
+  void FindOutliers();
+
+  const InnovationSeries* series_;
+  std::vector<std::size_t> frames_;
+  Rows rejected_, tested_, core_;
+  double outlier_nis_ = 0.0, outlier_share_ = 0.0;
+  bool has_outliers_ = false;
+};
+
+/// Returns the sum of value(i) over the rows of each frame. Omits frames without a row.
+template <class Value>
+std::vector<FrameSum> SumFrames(const InnovationView& view, const Rows& rows, const Value& value) {
+  std::vector<FrameSum> frames;
+  for (const std::size_t i : rows) {
+    if (frames.empty() || frames.back().frame != view.frame(i)) frames.push_back({view.frame(i)});
+    frames.back().sum += value(i);
+    ++frames.back().count;
+  }
+  return frames;
+}
+
+/// Returns the mean of value(i) over the rows of each frame. Omits frames without a row.
+template <class Value>
+std::vector<double> FrameMeans(const InnovationView& view, const Rows& rows, const Value& value) {
+  std::vector<double> means;
+  for (const FrameSum& frame : SumFrames(view, rows, value)) means.push_back(frame.mean());
+  return means;
+}
+
+/// Returns the median. `values` must not be empty.
+double Median(std::vector<double> values);
+double Mean(std::span<const double> values);
+/// Returns the sum of squared deviations from the mean.
+double SquaredDeviation(std::span<const double> values);
+/// Returns the autocorrelation at a delay of one value.
+double LagOneCorrelation(std::span<const double> values);
+/// Returns the integrated autocorrelation time of a series about its mean, at least 1. The sum
+/// 1 + 2 sum rho(k) ends before the first rho(k) < 2 / sqrt(n), at n / 3 or at k = 200.
+double CorrelationTime(std::span<const double> values);
+
+}  // namespace alidade::internal

@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "alidade/base/number_text.h"
+#include "alidade/base/statistics.h"
+#include "alidade/experiment/diagnosis_rules.h"
+
+namespace alidade::internal {
+namespace {
+
+/// Threshold of a normal variable: a two-sided probability of 1.6e-6.
+constexpr double kMaxNormal = 4.8;
+
+/// Statistic of one element of the measurement.
+struct ElementStatistic {
+  double normal = 0.0;  ///< normal with mean 0 and variance 1 if the rule finds nothing
+  double value = 0.0;   ///< for the text
+  std::size_t element = 0;
+};
+
+/// Returns the statistic with the largest |normal| over the elements.
+template <class Statistic>
+ElementStatistic Largest(const InnovationView& view, const Statistic& statistic) {
+  ElementStatistic largest;
+  for (std::size_t k = 0; k < view.dof(); ++k) {
+    ElementStatistic candidate = statistic(view, k);
+    candidate.element = k;
+    if (std::abs(candidate.normal) > std::abs(largest.normal)) largest = candidate;
+  }
+  return largest;
+}
+
+std::string ElementPrefix(const InnovationView& view, std::size_t k) {
+  return view.dof() == 1 ? "" : "element " + std::to_string(k) + ": ";
+}
+
+/// Returns sum u_k / sqrt(n) of the n tested measurements of each frame.
+std::vector<double> FrameInnovations(const InnovationView& view, std::size_t k) {
+  std::vector<double> series;
+  for (const FrameSum& frame :
+       SumFrames(view, view.tested(), [&](std::size_t i) { return view.u(i, k); })) {
+    series.push_back(frame.sum / std::sqrt(frame.count));
+  }
+  return series;
+}
+
+/// Mean of the innovation, in sigma. The uncertainty of the mean allows for correlation in time.
+ElementStatistic BiasOf(const InnovationView& view, std::size_t k) {
+  const std::vector<double> series = FrameInnovations(view, k);
+  const auto n = static_cast<double>(series.size());
+  const double variance = SquaredDeviation(series) / (n - 1.0);
+  double mean = 0.0;
+  for (const std::size_t i : view.tested()) mean += view.u(i, k);
+  return {Mean(series) / std::sqrt(std::max(variance, 1e-24) * CorrelationTime(series) / n),
+          mean / static_cast<double>(view.tested().size())};
+}
+
+ElementStatistic CorrelationOf(const InnovationView& view, std::size_t k) {
+  const std::vector<double> series = FrameInnovations(view, k);
+  const double rho = LagOneCorrelation(series);
+  return {rho * std::sqrt(static_cast<double>(series.size())), rho};
+}
+
+/// Innovations, and the rates of their predictions.
+struct RateSamples {
+  Rows rows;
+  std::vector<double> rate;  ///< dh/dt / sqrt(S), 1/s
+  std::vector<double> u;
+};
+
+/// Computes the rate of h by the difference to the previous measurement of the same landmark. Such
+/// a rate does not depend on the innovation, so that both are independent in a consistent filter. A
+/// central difference would depend on it. Returns no samples if several measurements of a frame
+/// have the same landmark, or none, because the previous measurement is then ambiguous.
+RateSamples RatesOf(const InnovationView& view, std::size_t k) {
+  RateSamples samples;
+  std::map<std::int64_t, std::size_t> previous;  // row of the last measurement, by landmark
+  for (const std::size_t i : view.tested()) {
+    const auto [entry, is_first] = previous.try_emplace(view.series().landmarks[i], i);
+    const std::size_t before = std::exchange(entry->second, i);
+    const double dt = view.time_s(i) - view.time_s(before);
+    if (!is_first && dt == 0.0) return {};
+    if (is_first || !(dt > 0.0)) continue;
+    samples.rows.push_back(i);
+    samples.rate.push_back((view.h(i, k) - view.h(before, k)) / dt / view.s(i, k));
+    samples.u.push_back(view.u(i, k));
+  }
+  return samples;
+}
+
+/// Slope of u against the rate, in s, by least squares. Its variance is that of sums over frames,
+/// because the innovations of a frame depend on the same prediction.
+ElementStatistic OffsetOf(const InnovationView& view, std::size_t k) {
+  constexpr std::size_t kMinSamples = 30;
+  constexpr double kMinSigmas = 0.1;  // root mean square of the effect on u
+  if (!view.has_z(k)) return {};
+  const RateSamples samples = RatesOf(view, k);
+  if (samples.rows.size() <= kMinSamples) return {};
+  const double mean_rate = Mean(samples.rate), mean_u = Mean(samples.u);
+  const double square = SquaredDeviation(samples.rate);
+  if (!(square > 1e-12 * (square + mean_rate * mean_rate))) return {};
+  double product = 0.0;
+  for (std::size_t j = 0; j < samples.u.size(); ++j) {
+    product += (samples.rate[j] - mean_rate) * (samples.u[j] - mean_u);
+  }
+  const double slope = product / square;
+  const double rate_rms = std::sqrt(square / static_cast<double>(samples.rate.size()));
+  if (!(std::abs(slope) * rate_rms > kMinSigmas)) return {};
+  std::size_t j = 0;
+  std::vector<double> scores;
+  double variance = 0.0;
+  for (const FrameSum& frame : SumFrames(view, samples.rows, [&](std::size_t) {
+         const double rate = samples.rate[j] - mean_rate;
+         return rate * (samples.u[j++] - mean_u - slope * rate);
+       })) {
+    scores.push_back(frame.sum);
+    variance += frame.sum * frame.sum;
+  }
+  return {slope * square / std::sqrt(variance * CorrelationTime(scores)), slope};
+}
+
+/// Ratio of the mean of a squared innovation to its expected value, by frames of the core.
+struct Scale {
+  double ratio = 1.0;
+  double independent = 1.0;  ///< number of independent frames
+
+  ScaleTest Test(double dof) const { return TestScale(ratio, dof, independent); }
+  /// Returns the factor of the innovations.
+  double factor() const { return std::sqrt(ratio); }
+};
+template <class Value>
+Scale ScaleOf(const InnovationView& view, const Value& value) {
+  const std::vector<double> means = FrameMeans(view, view.core(), value);
+  return {Mean(means), static_cast<double>(means.size()) / CorrelationTime(means)};
+}
+
+/// Returns the mean NIS of a quarter of the core, from the measurement `begin`. `order` sorts the
+/// core.
+double QuarterMean(const InnovationView& view, const Rows& order, std::size_t begin) {
+  double sum = 0.0;
+  const std::size_t count = order.size() / 4;
+  for (std::size_t j = 0; j < count; ++j) sum += view.nis(order[begin + j]);
+  return sum / static_cast<double>(count);
+}
+
+}  // namespace
+
+MaybeFinding TestNoiseModel(const InnovationView& view) {
+  constexpr double kMaxNis = 16.0, kMinNis = 1e-12, kMinSpread = 0.05;
+  constexpr std::size_t kMinFrames = 60;
+  if (view.dof() != 1 || !view.has_z(0)) return {};
+  Rows rows;
+  std::vector<double> size, nis;  // log |h|, and the NIS up to kMaxNis
+  for (const std::size_t i : view.core()) {
+    if (view.h(i, 0) == 0.0 || view.nis(i) <= kMinNis) continue;
+    rows.push_back(i);
+    size.push_back(std::log(std::abs(view.h(i, 0))));
+    nis.push_back(std::min(view.nis(i), kMaxNis));
+  }
+  if (FrameMeans(view, rows, [](std::size_t) { return 0.0; }).size() <= kMinFrames) return {};
+  const auto n = static_cast<double>(rows.size());
+  const double square = SquaredDeviation(size), mean = Mean(size);
+  if (!(std::sqrt(square / n) > kMinSpread)) return {};
+  double product = 0.0;
+  for (std::size_t j = 0; j < nis.size(); ++j) product += (size[j] - mean) * nis[j];
+  const double normal = product / std::sqrt(square * SquaredDeviation(nis) / n);
+  if (!(std::abs(normal) > kMaxNormal)) return {};
+  std::ranges::sort(rows, {}, [&](std::size_t i) { return std::abs(view.h(i, 0)); });
+  return MakeFinding(
+      FindingKind::kHeteroscedastic, view, normal,
+      "the NIS is " + RoundedText(QuarterMean(view, rows, 0), 3) +
+          " at the smallest quarter of the predictions and " +
+          RoundedText(QuarterMean(view, rows, rows.size() - rows.size() / 4), 3) +
+          " at the largest: the noise depends on the measured quantity in another way than in the "
+          "model; choose another noise model");
+}
+
+MaybeFinding TestTails(const InnovationView& view) {
+  if (!view.has_outliers() || view.series().has_robust_loss) return {};
+  return MakeFinding(FindingKind::kHeavyTails, view, view.outlier_share(),
+                     RoundedText(100.0 * view.outlier_share(), 2) +
+                         " % of the innovations are outliers, and 0.01 % are expected; use `gate`, "
+                         "`loss: {huber: 1.345}` or `outlier_rejection`");
+}
+
+MaybeFinding TestElements(const InnovationView& view) {
+  constexpr double kMinContrast = 1.6, kMinFactor = 1.3;
+  if (view.dof() < 2) return {};
+  double smallest = 1e300, largest = 0.0, worst = 1.0;
+  std::string list;
+  for (std::size_t k = 0; k < view.dof(); ++k) {
+    const Scale scale = ScaleOf(view, [&](std::size_t i) { return view.u(i, k) * view.u(i, k); });
+    const double factor = scale.factor();
+    smallest = std::min(smallest, factor);
+    largest = std::max(largest, factor);
+    const bool is_wrong = std::abs(std::log(factor)) > std::log(kMinFactor);
+    if (!is_wrong || scale.Test(1.0) == ScaleTest::kPassed) continue;
+    list +=
+        (list.empty() ? "" : ", ") + RoundedText(factor, 3) + " for element " + std::to_string(k);
+    if (std::abs(std::log(factor)) > std::abs(std::log(worst))) worst = factor;
+  }
+  if (list.empty() || !(largest > kMinContrast * smallest)) return {};
+  return MakeFinding(FindingKind::kElement, view, worst,
+                     "the ratio of the innovations to their predicted size depends on the element: "
+                     "it is " +
+                         list +
+                         "; multiply the sigma of each of these elements by its ratio, and check "
+                         "its unit");
+}
+
+MaybeFinding TestTimeOffset(const InnovationView& view) {
+  constexpr double kMinNormal = 6.0, kMinCorrelation = -0.1;
+  const ElementStatistic offset = Largest(view, OffsetOf);
+  if (!(std::abs(offset.normal) > kMinNormal)) return {};
+  if (Largest(view, CorrelationOf).value <= kMinCorrelation) return {};
+  return MakeFinding(FindingKind::kTimeOffset, view, offset.normal,
+                     ElementPrefix(view, offset.element) +
+                         "innovations are proportional to the rate of the prediction, as if "
+                         "measurements were made " +
+                         RoundedText(1e3 * std::abs(offset.value), 3) + " ms " +
+                         (offset.value > 0.0 ? "after" : "before") + " their timestamps; add " +
+                         RoundedText(offset.value, 2) +
+                         " to `time_offset_s` of the sensor, or estimate it, because the true "
+                         "value may be larger");
+}
+
+MaybeFinding TestBias(const InnovationView& view) {
+  constexpr double kMinSigmas = 0.1;
+  const ElementStatistic bias = Largest(view, BiasOf);
+  if (!(std::abs(bias.normal) > kMaxNormal && std::abs(bias.value) > kMinSigmas)) return {};
+  double mean = 0.0;
+  for (const std::size_t i : view.tested()) mean += view.r(i, bias.element);
+  mean /= static_cast<double>(view.tested().size());
+  return MakeFinding(FindingKind::kBias, view, bias.normal,
+                     ElementPrefix(view, bias.element) + "the mean innovation is " +
+                         RoundedText(mean, 3) + " (" + RoundedText(bias.value, 3) +
+                         " sigma), and 0 is expected: the sensor has a bias, or an extrinsic or a "
+                         "calibration is wrong; correct it or estimate it");
+}
+
+MaybeFinding TestCorrelation(const InnovationView& view) {
+  constexpr double kMinCorrelation = 0.15;
+  const ElementStatistic rho = Largest(view, CorrelationOf);
+  if (!(std::abs(rho.normal) > kMaxNormal && std::abs(rho.value) > kMinCorrelation)) return {};
+  const bool is_positive = rho.value > 0.0;
+  return MakeFinding(
+      is_positive ? FindingKind::kCorrelated : FindingKind::kAnticorrelated, view, rho.normal,
+      ElementPrefix(view, rho.element) + "successive innovations have the correlation " +
+          RoundedText(rho.value, 2) + ", and 0 is expected: " +
+          (is_positive ? "the filter corrects too little: the process noise is too small, sigma is "
+                         "too large, or the model lacks a motion or a bias; increase the process "
+                         "noise, decrease sigma, or estimate the bias"
+                       : "the filter corrects too much: the process noise is too large, or sigma "
+                         "is too small; decrease the process noise or increase sigma"));
+}
+
+MaybeFinding TestScaleOfNis(const InnovationView& view) {
+  if (view.series().has_robust_loss) return {};
+  const int dof = view.series().dof;
+  const double expected = dof * view.expected_nis();
+  const Scale scale = ScaleOf(view, [&](std::size_t i) { return view.nis(i) / expected; });
+  const ScaleTest test = scale.Test(dof);
+  if (test == ScaleTest::kPassed) return {};
+  const double factor = scale.factor();
+  const bool is_large = test == ScaleTest::kTooLarge;
+  const FindingKind kind = is_large ? FindingKind::kOverconfident : FindingKind::kUnderconfident;
+  const std::string size =
+      "innovations are " + RoundedText(factor, 3) + " times as large as predicted";
+  if (TestElements(view)) {
+    return MakeFinding(kind, view, factor, size + "; this ratio depends on the element");
+  }
+  const char* const map =
+      is_large && view.series().has_landmark_prior
+          ? "; if the camera moved slowly at first, near and far landmarks may instead be "
+            "exchanged: add landmarks later by `landmarks.prior.min_observations: 30`"
+          : "";
+  return MakeFinding(kind, view, factor,
+                     size + ", so sigma or the process noise is too " +
+                         (is_large ? "small" : "large") + "; multiply sigma by about " +
+                         RoundedText(factor, 2) + map);
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/verdict.h"
+
+#include <algorithm>
+
+#include "alidade/base/number_text.h"
+#include "alidade/base/statistics.h"
+#include "alidade/experiment/time_series.h"
+
+namespace alidade {
+namespace {
+
+using internal::RoundedText;
+
+constexpr std::int64_t kMinSamples = 20;
+constexpr std::int64_t kMaxRejectedInARow = 20;
+
+/// Returns the verdict `state` for the first event that satisfies `is_cause`.
+template <class Predicate>
+Verdict FromEvent(VerdictState state, std::span<const Event> events, const Predicate& is_cause) {
+  const auto cause = std::ranges::find_if(events, is_cause);
+  if (cause == events.end()) return {.state = state, .because = "the estimator ended early"};
+  return {.state = state, .because = cause->text, .since = cause->timestamp};
+}
+
+std::optional<Verdict> FromRejections(std::span<const SensorUse> sensors) {
+  for (const SensorUse& use : sensors) {
+    const std::int64_t total = use.used + use.rejected;
+    const bool at_end = use.rejected_in_a_row >= kMaxRejectedInARow;
+    if (!at_end && (2 * use.rejected <= total || total < kMinSamples)) continue;
+    return Verdict{
+        .state = VerdictState::kMostlyRejected,
+        .because = "sensor '" + use.sensor + "': " + std::to_string(use.rejected) + " of " +
+                   std::to_string(total) + " measurements were rejected" +
+                   (at_end ? ", and all of the last " + std::to_string(use.rejected_in_a_row) : ""),
+        .since = at_end ? use.rejected_since : kNoTimestamp};
+  }
+  return std::nullopt;
+}
+
+/// Returns the number of independent values whose mean is as certain as the mean of the series. The
+/// autocorrelation is about the mean of the series. A short series hides slow components, so its
+/// time is multiplied by kSafety. If the values vary much less than those of independent runs, as
+/// for a constant, the series counts as one value.
+double IndependentValues(const NeesSeries& series, double mean) {
+  constexpr double kSmallestVariance = 0.25;  // relative to that of chi2(dof) / dof
+  constexpr double kSafety = 5.0;
+  double variance = 0.0;
+  for (const double value : series.values) variance += (value - mean) * (value - mean);
+  const auto n = static_cast<double>(series.values.size());
+  variance /= n;
+  if (variance < kSmallestVariance * 2.0 / series.dof * mean * mean) return 1.0;
+  return std::max(1.0, n / (kSafety * AutocorrelationTime(series.values, mean)));
+}
+
+/// Returns the verdict of the NEES that is farthest from 1.
+Verdict FromNees(std::span<const NeesSeries> owners) {
+  Verdict verdict;
+  verdict.state = VerdictState::kConsistent;
+  verdict.basis = VerdictBasis::kNees;
+  double worst = 1.0;
+  std::string means;
+  for (const NeesSeries& owner : owners) {
+    if (std::ssize(owner.values) < kMinSamples) continue;
+    double sum = 0.0;
+    for (const double value : owner.values) sum += value;
+    const double mean = sum / static_cast<double>(owner.values.size());
+    const ScaleTest test = TestScale(mean, owner.dof, IndependentValues(owner, mean));
+    means += (means.empty() ? "" : ", ") + owner.owner + ' ' + RoundedText(mean, 3);
+    if (test == ScaleTest::kPassed) continue;
+    const double distance = std::max(mean, 1.0 / mean);
+    if (!(distance > worst)) continue;
+    worst = distance;
+    verdict.state =
+        test == ScaleTest::kTooLarge ? VerdictState::kOverconfident : VerdictState::kUnderconfident;
+    verdict.because = "the NEES of " + owner.owner + " is " + RoundedText(mean, 3) +
+                      ", and 1 is expected: the errors are " + (mean > 1.0 ? "larger" : "smaller") +
+                      " than P indicates";
+  }
+  if (means.empty()) {
+    return {.because =
+                "there are fewer than " + std::to_string(kMinSamples) + " timestamps with truth"};
+  }
+  if (verdict.state == VerdictState::kConsistent) {
+    verdict.because = "NEES " + means + " (1 is expected)";
+  }
+  return verdict;
+}
+
+/// Returns the verdict of the first finding about the size of the innovations, if there is one.
+std::optional<Verdict> FromInnovationSizes(std::span<const Finding> findings) {
+  for (const Finding& finding : findings) {
+    const bool is_large = finding.kind == FindingKind::kOverconfident;
+    if (!is_large && finding.kind != FindingKind::kUnderconfident) continue;
+    return Verdict{.state = is_large ? VerdictState::kOverconfident : VerdictState::kUnderconfident,
+                   .because = finding.text,
+                   .basis = VerdictBasis::kNis};
+  }
+  return std::nullopt;
+}
+
+/// Returns the verdict without truth of an estimator whose innovations have the expected size.
+Verdict WithoutTruth(std::int64_t innovations) {
+  if (innovations < kMinSamples) {
+    return {.because = "there are only " + std::to_string(innovations) +
+                       " innovations to test, and no truth"};
+  }
+  return {.state = VerdictState::kConsistent,
+          .because = "the NIS of each sensor is as expected; there is no truth to test the errors",
+          .basis = VerdictBasis::kNis};
+}
+
+/// Returns the first verdict that applies.
+Verdict VerdictOf(const VerdictFacts& facts) {
+  const auto is_divergence = [](const Event& event) {
+    return event.divergence || InfoOf(event.kind).severity == EventSeverity::kError;
+  };
+  if (facts.failed) return FromEvent(VerdictState::kFailed, facts.events, is_divergence);
+  if (facts.diverged) return FromEvent(VerdictState::kDiverged, facts.events, is_divergence);
+  const auto is_lost = [](const Event& event) { return event.kind == EventKind::kLost; };
+  if (std::ranges::any_of(facts.events, is_lost)) {
+    Verdict verdict = FromEvent(VerdictState::kLost, facts.events, is_lost);
+    verdict.basis = VerdictBasis::kNees;
+    return verdict;
+  }
+  if (const auto rejected = FromRejections(facts.sensors)) return *rejected;
+  const Verdict verdict =
+      facts.nees.empty() ? WithoutTruth(facts.innovations) : FromNees(facts.nees);
+  const bool is_wrong =
+      verdict.basis == VerdictBasis::kNees && verdict.state != VerdictState::kConsistent;
+  if (is_wrong) return verdict;
+  return FromInnovationSizes(facts.findings).value_or(verdict);
+}
+
+}  // namespace
+
+const char* ToString(VerdictBasis basis) {
+  constexpr std::array kNames = {"none", "nis", "nees"};
+  return kNames[static_cast<std::size_t>(basis)];
+}
+
+std::optional<VerdictState> VerdictStateOf(std::string_view name) {
+  for (const VerdictInfo& info : kVerdicts) {
+    if (name == info.name) return info.state;
+  }
+  return std::nullopt;
+}
+
+Verdict ComputeVerdict(const VerdictFacts& facts) {
+  Verdict verdict = VerdictOf(facts);
+  if (std::ranges::find(facts.events, EventKind::kDigitsLost, &Event::kind) != facts.events.end()) {
+    verdict.because += "; sigmas may be wrong by rounding (event digits_lost)";
+  }
+  return verdict;
+}
+
+}  // namespace alidade

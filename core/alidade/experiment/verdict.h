@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/base/timestamp.h"
+#include "alidade/estimation/event.h"
+#include "alidade/experiment/diagnosis.h"
+
+namespace alidade {
+
+/// Verdict on the estimates of an estimator, from the worst to the best.
+enum class VerdictState {
+  kFailed,
+  kDiverged,
+  kLost,
+  kMostlyRejected,
+  kOverconfident,
+  kUnderconfident,
+  kNotTested,
+  kConsistent,
+};
+
+/// Name and meaning of a verdict.
+struct VerdictInfo {
+  VerdictState state;
+  const char* name;     ///< name in files and tables
+  const char* meaning;  ///< description in the documentation
+};
+
+/// All verdicts. The first that applies is the verdict of an estimator.
+inline constexpr std::array kVerdicts = {
+    VerdictInfo{VerdictState::kFailed, "failed", "the estimator ended before the data did"},
+    VerdictInfo{VerdictState::kDiverged, "diverged",
+                "an estimate left the domain of its models, or P could not be repaired"},
+    VerdictInfo{VerdictState::kLost, "lost",
+                "the error of a block element exceeded 10 sigma for 20 timestamps in a row; "
+                "requires truth"},
+    VerdictInfo{VerdictState::kMostlyRejected, "mostly rejected",
+                "more than half of the measurements of a sensor were rejected, or its last 20 in "
+                "a row"},
+    VerdictInfo{VerdictState::kOverconfident, "overconfident",
+                "the errors are larger than P indicates: a mean NEES or NIS is too large"},
+    VerdictInfo{VerdictState::kUnderconfident, "underconfident",
+                "the errors are smaller than P indicates: a mean NEES or NIS is too small"},
+    VerdictInfo{VerdictState::kNotTested, "not tested",
+                "there were fewer than 20 errors or innovations to test"},
+    VerdictInfo{VerdictState::kConsistent, "consistent",
+                "the tests by NEES and NIS, or without truth by NIS, were passed"},
+};
+
+/// Data that a verdict is based on.
+enum class VerdictBasis { kNone, kNis, kNees };
+/// Returns `none`, `nis` or `nees`.
+const char* ToString(VerdictBasis basis);
+
+/// Verdict on an estimator, with its reason.
+struct Verdict {
+  VerdictState state = VerdictState::kNotTested;
+  std::string because;             ///< one sentence
+  Timestamp since = kNoTimestamp;  ///< time from which the estimates are wrong, if known
+  VerdictBasis basis = VerdictBasis::kNone;
+};
+
+/// Returns the name of a state: `mostly rejected`.
+inline const char* ToString(VerdictState state) {
+  return kVerdicts[static_cast<std::size_t>(state)].name;
+}
+/// Returns the state with this name, or nullopt.
+std::optional<VerdictState> VerdictStateOf(std::string_view name);
+
+/// NEES of the blocks of an owner over a run.
+struct NeesSeries {
+  std::string owner;
+  double dof = 0.0;            ///< mean number of error elements
+  std::vector<double> values;  ///< e' C^-1 e / dof, evenly thinned
+};
+
+/// Use of the measurements of a sensor over a run.
+struct SensorUse {
+  std::string sensor;
+  std::int64_t used = 0, rejected = 0;
+  std::int64_t rejected_in_a_row = 0;       ///< rejections since the last used measurement
+  Timestamp rejected_since = kNoTimestamp;  ///< time of the first of these rejections
+};
+
+/// Facts about a run that determine the verdict.
+struct VerdictFacts {
+  bool failed = false, diverged = false;
+  std::span<const Event> events = {};
+  std::span<const SensorUse> sensors = {};
+  std::span<const NeesSeries> nees = {};   ///< empty if the truth is unknown
+  std::span<const Finding> findings = {};  ///< about the innovations
+  std::int64_t innovations = 0;            ///< number of innovations that were tested
+};
+
+/// Computes the verdict. The mean of n values of NEES / dof is too large if it exceeds the quantile
+/// of chi2(nu) / nu of probability 1 - 8e-7 and is at least 1.15^2. It is too small if it is below
+/// the quantile of probability 8e-7 and at most 1.15^-2. nu = dof n / (5 tau) with the
+/// autocorrelation time; the factor 5 allows for slow components that a short run hides. nu = dof
+/// if the values are nearly constant. If the NEES passes, or without truth, the findings about the
+/// size of the innovations determine the verdict.
+Verdict ComputeVerdict(const VerdictFacts& facts);
+
+}  // namespace alidade

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/verdict.h"
+
+#include <gtest/gtest.h>
+
+#include "alidade/base/random.h"
+#include "alidade/base/statistics.h"
+
+namespace alidade {
+namespace {
+
+/// Returns `n` values of chi2(3) / 3 times `factor`.
+NeesSeries MakeNees(double factor, int n) {
+  Random random(7);
+  NeesSeries series{"target", 3.0, {}};
+  for (int k = 0; k < n; ++k) {
+    double sum = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      const double x = random.Normal();
+      sum += x * x;
+    }
+    series.values.push_back(factor * sum / 3.0);
+  }
+  return series;
+}
+
+VerdictState StateOf(double factor, int n) {
+  const NeesSeries nees = MakeNees(factor, n);
+  return ComputeVerdict({.nees = {&nees, 1}}).state;
+}
+
+TEST(Verdict, ComparesTheMeanNeesWithOne) {
+  EXPECT_EQ(StateOf(1.0, 200), VerdictState::kConsistent);
+  EXPECT_EQ(StateOf(2.0, 200), VerdictState::kOverconfident);
+  EXPECT_EQ(StateOf(0.4, 200), VerdictState::kUnderconfident);
+  EXPECT_EQ(StateOf(2.0, 19), VerdictState::kNotTested);
+  // The sigmas may be wrong by 15 %, however many samples there are.
+  EXPECT_EQ(StateOf(1.2, 100'000), VerdictState::kConsistent);
+}
+
+TEST(Verdict, StatesItsReasonAndItsBasis) {
+  const NeesSeries nees = MakeNees(4.0, 200);
+  const Verdict verdict = ComputeVerdict({.nees = {&nees, 1}});
+  EXPECT_EQ(verdict.basis, VerdictBasis::kNees);
+  EXPECT_NE(verdict.because.find("the NEES of target is "), std::string::npos) << verdict.because;
+  EXPECT_NE(verdict.because.find("larger than P indicates"), std::string::npos) << verdict.because;
+}
+
+TEST(Verdict, IsTheFirstThatApplies) {
+  const NeesSeries nees = MakeNees(9.0, 200);
+  const SensorUse rejected{.sensor = "gnss", .used = 30, .rejected = 31};
+  const Event lost{5, EventKind::kLost, "the error exceeded 10 sigma"};
+  Event diverged{7, EventKind::kDiverged, "out of domain"};
+  diverged.divergence = true;
+  VerdictFacts facts{.nees = {&nees, 1}};
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kOverconfident);
+  facts.sensors = {&rejected, 1};
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kMostlyRejected);
+  const std::vector<Event> events = {lost, diverged};
+  facts.events = {events.data(), 1};
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kLost);
+  EXPECT_EQ(ComputeVerdict(facts).since, 5);
+  facts.events = events;
+  facts.diverged = true;
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kDiverged);
+  EXPECT_EQ(ComputeVerdict(facts).since, 7);
+  facts.failed = true;
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kFailed);
+}
+
+TEST(Verdict, MentionsTheEventThatDigitsWereLost) {
+  const NeesSeries nees = MakeNees(1.0, 200);
+  const Event lost{5, EventKind::kDigitsLost, "a variance is lost by rounding"};
+  VerdictFacts facts;
+  facts.nees = {&nees, 1};
+  EXPECT_EQ(ComputeVerdict(facts).because.find("digits_lost"), std::string::npos);
+  facts.events = {&lost, 1};
+  EXPECT_NE(ComputeVerdict(facts).because.find("digits_lost"), std::string::npos);
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kConsistent);
+}
+
+TEST(Verdict, CountsTheRejectionsAtTheEnd) {
+  SensorUse use{.sensor = "gnss", .used = 1000, .rejected = 20, .rejected_in_a_row = 19};
+  EXPECT_EQ(ComputeVerdict({.sensors = {&use, 1}}).state, VerdictState::kNotTested);
+  use.rejected_in_a_row = 20;
+  use.rejected_since = 3;
+  const Verdict verdict = ComputeVerdict({.sensors = {&use, 1}});
+  EXPECT_EQ(verdict.state, VerdictState::kMostlyRejected);
+  EXPECT_EQ(verdict.since, 3);
+}
+
+TEST(Verdict, UsesTheInnovationsWithoutTruth) {
+  const Finding finding{FindingKind::kOverconfident, "gnss", "innovations are 2 times as large",
+                        2.0};
+  VerdictFacts facts;
+  facts.innovations = 19;
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kNotTested);
+  facts.innovations = 100;
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kConsistent);
+  EXPECT_EQ(ComputeVerdict(facts).basis, VerdictBasis::kNis);
+  facts.findings = {&finding, 1};
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kOverconfident);
+}
+
+// The innovations of a filter are less correlated than its errors, so they show a wrong sigma in
+// runs that are too short for the NEES.
+TEST(Verdict, UsesTheInnovationsIfTheNeesIsPassed) {
+  const Finding finding{FindingKind::kUnderconfident, "gnss", "innovations are half as large", 0.5};
+  const NeesSeries passed = MakeNees(1.0, 200), failed = MakeNees(4.0, 200);
+  VerdictFacts facts;
+  facts.nees = {&passed, 1};
+  facts.findings = {&finding, 1};
+  facts.innovations = 100;
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kUnderconfident);
+  EXPECT_EQ(ComputeVerdict(facts).basis, VerdictBasis::kNis);
+  facts.nees = {&failed, 1};
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kOverconfident);
+  EXPECT_EQ(ComputeVerdict(facts).basis, VerdictBasis::kNees);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "csv.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -209,15 +211,27 @@ class CsvSource : public Source {
     return true;
   }
 
+  /// Returns the key `source.missing` with the text of a further cell.
+  std::string MissingWith(std::string_view text) const {
+    const auto quoted = [](std::string_view word) {
+      const bool is_plain = !word.empty() && std::ranges::all_of(word, [](unsigned char c) {
+        return std::isalpha(c) != 0;
+      });
+      return is_plain ? cell::PrintableStart(word) : '"' + cell::PrintableStart(word) + '"';
+    };
+    std::string list;
+    for (const std::string& word : layout_.missing) list += quoted(word) + ", ";
+    return "source.missing: [" + list + quoted(text) + ']';
+  }
+
   double ReadNumber(const CsvColumn& column, bool may_miss = true) const {
     double value = 0.0;
     const std::string_view text = cell::Trim(cells_[column.index]);
     const char* const problem = cell::ParseNumber(text, value);
     if (problem == nullptr) return value;
-    std::string expected = "a finite number";
-    if (may_miss && !std::isfinite(value))
-      expected += ", or 'source.missing: " + cell::PrintableStart(text) + '\'';
-    FailCell(column, problem, expected);
+    const bool may_mark = may_miss && text.find_first_of("0123456789") == text.npos;
+    FailCell(column, text.empty() ? "is an empty cell" : problem,
+             may_mark ? "a finite number, or '" + MissingWith(text) + '\'' : "a finite number");
   }
 
   Timestamp ReadTimestamp() const {

@@ -117,10 +117,22 @@ std::string OtherSeparator(const std::vector<std::string>& names) {
   return {};
 }
 
+/// Returns true if all names of a header are numbers, which means that the header is missing.
+bool AreNumbers(const std::vector<std::string>& names) {
+  double value = 0.0;
+  return std::ranges::all_of(
+      names, [&](const std::string& name) { return cell::ParseNumber(name, value) == nullptr; });
+}
+
 /// Finds a column in `names`, the header of `file`.
 void Resolve(const std::vector<std::string>& names, const std::string& file, CsvColumn& column) {
   constexpr std::size_t kListed = 20;
   const auto found = std::find(names.begin(), names.end(), column.name);
+  if (found == names.end() && AreNumbers(names)) {
+    column.node.Fail("there is no column '" + column.name + "' in " + file +
+                         ", because its first line contains numbers, not names",
+                     "a first line that names the columns, as in 't_s,depth'");
+  }
   if (found == names.end()) {
     std::string expected = "one of ";
     for (std::size_t i = 0; i < std::min(names.size(), kListed); ++i) {

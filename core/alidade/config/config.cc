@@ -7,7 +7,9 @@
 #include <cstring>
 #include <unordered_map>
 
+#include "alidade/base/text.h"
 #include "alidade/config/tree.h"
+#include "alidade/io/near_file.h"
 #include "alidade/io/read_file.h"
 
 namespace alidade {
@@ -72,7 +74,8 @@ std::string ReadConfig(const fs::path& file, const Place& place, std::string_vie
   const auto fail = [&](ExitCode code, int error) {
     const std::string name = key.empty() ? "" : Quoted(file.string()) + ' ';
     const char* const reason = error == EISDIR ? "it is a directory" : std::strerror(error);
-    throw Error(code, ErrorLine(place, key, name + "cannot be read: " + reason));
+    const std::string meant = error == EISDIR ? internal::ConfigIn(file) : internal::NearFile(file);
+    throw Error(code, ErrorLine(place, key, name + "cannot be read: " + reason, {}, meant));
   };
   return internal::ReadFile(file, fail, kLimit);
 }
@@ -225,6 +228,30 @@ std::vector<Step> ParseDotted(std::string_view dotted, const Place& place) {
   }
 }
 
+/// Rejects a key below an entry that `root` does not contain, because the user names the entries of
+/// these maps, and a misspelt name would create a new entry. The keys `type` and `model` create an
+/// entry.
+void RejectNewEntry(const ConfigTree& root, const std::vector<Step>& steps, const Place& place,
+                    std::string_view dotted) {
+  constexpr std::pair<const char*, const char*> kMaps[] = {
+      {"estimators", "estimator"}, {"sensors", "sensor"}, {"state", "state entry"}};
+  for (const auto& [key, noun] : kMaps) {
+    if (steps.size() < 3 || steps[0].name != key || steps[1].name.empty()) continue;
+    if (steps.size() == 3 && (steps[2].name == "type" || steps[2].name == "model")) continue;
+    const ConfigTree* const map = Child(root, key);
+    const std::string& name = steps[1].name;
+    if (map != nullptr && Child(*map, name) != nullptr) continue;
+    std::vector<std::string> names;
+    if (map != nullptr) {
+      for (const auto& child : map->children) names.push_back(child->key);
+    }
+    const std::string entries = names.empty() ? "" : internal::Join(names) + ", or ";
+    FailAt(place, dotted, std::string(noun) + ' ' + Quoted(name) + " does not exist",
+           entries + "a whole new entry, as in " + key + '.' + name + "={KEY: VALUE}",
+           Nearest(name, names));
+  }
+}
+
 /// Returns the child of `node` at `step`. Adds an empty child if `node` is a map without this key.
 std::unique_ptr<ConfigTree>* Descend(ConfigTree* node, const Step& step, const Place& place,
                                      std::string_view dotted) {
@@ -301,6 +328,7 @@ void Config::Set(std::string_view dotted_key, std::string_view value, std::strin
   auto next = internal::ParseYaml(value, Origin{place.file, std::string(dotted_key), false, depth},
                                   &budget);
   if (next == nullptr) FailAt(place, dotted_key, "no value", "a value, or \"\" for an empty text");
+  RejectNewEntry(*tree_, steps, place, dotted_key);
   ConfigTree* node = tree_.get();
   std::unique_ptr<ConfigTree>* slot = nullptr;
   for (const Step& step : steps) {

@@ -43,8 +43,12 @@ class Node {
   /// this node is not a map.
   std::optional<Node> Find(std::string_view key) const;
   /// Returns the value of `key` of this map. If the key is missing, the error reports that
-  /// `needed_by` needs it.
-  Node At(std::string_view key, std::string_view needed_by = {}) const;
+  /// `needed_by` needs it, and contains `expected`.
+  Node At(std::string_view key, std::string_view needed_by = {},
+          std::string_view expected = {}) const;
+  /// Fails unless this node is a map. The error contains `example`, a text such as
+  /// `{mean: 0.3, sigma: 0.1}`.
+  void ExpectMap(std::string_view example) const;
   /// Returns all entries of this map in the order of the file, and records each key as read.
   std::vector<std::pair<std::string, Node>> Entries() const;
   /// Returns all items of this list.
@@ -55,7 +59,9 @@ class Node {
   /// Returns a finite number. Rejects a unit, trailing text, leading zeros, underflow and overflow.
   double Number() const;
   /// Returns a number within [low, high]. `low_open` and `high_open` exclude the respective bound.
-  double Number(double low, double high, bool low_open = false, bool high_open = false) const;
+  /// Errors contain `unit`.
+  double Number(double low, double high, bool low_open = false, bool high_open = false,
+                std::string_view unit = {}) const;
   /// Returns an integer within [low, high], with the strict syntax of Number(). The smallest or
   /// largest value of the type means that there is no bound.
   std::int64_t Integer(std::int64_t low, std::int64_t high) const;
@@ -65,8 +71,8 @@ class Node {
   /// Returns the index of the scalar in `choices`. Fails if `choices` does not contain it.
   int Choice(const std::vector<std::string>& choices) const;
   /// Returns a list of numbers; a single number counts as a list of one number. If `size` < 0, any
-  /// length above zero is accepted.
-  std::vector<double> Numbers(int size = -1) const;
+  /// length above zero is accepted. Errors contain `unit`.
+  std::vector<double> Numbers(int size = -1, std::string_view unit = {}) const;
 
   /// Fails if this map contains a key that was never read, and suggests the most similar known key.
   /// Also checks each nested map from which at least one key was read.

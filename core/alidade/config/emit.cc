@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 
+#include "alidade/base/text.h"
 #include "alidade/config/tree.h"
 
 namespace alidade::internal {

@@ -59,9 +59,13 @@ std::optional<Node> Node::Find(std::string_view key) const {
   return child == nullptr ? std::nullopt : std::optional<Node>(Node(child));
 }
 
-Node Node::At(std::string_view key, std::string_view needed_by) const {
+Node Node::At(std::string_view key, std::string_view needed_by, std::string_view expected) const {
   if (const std::optional<Node> child = Find(key)) return *child;
-  FailMissing(*tree_, key, needed_by);
+  FailMissing(*tree_, key, needed_by, expected);
+}
+
+void Node::ExpectMap(std::string_view example) const {
+  Expect(*tree_, Kind::kMap, ("a map, as in " + std::string(example)).c_str());
 }
 
 std::vector<std::pair<std::string, Node>> Node::Entries() const {
@@ -87,23 +91,26 @@ std::vector<Node> Node::ItemsOrOne() const {
 
 double Node::Number() const { return internal::ReadNumber(*tree_, "a number"); }
 
-double Node::Number(double low, double high, bool low_open, bool high_open) const {
-  return internal::ReadNumber(*tree_, low, high, low_open, high_open);
+double Node::Number(double low, double high, bool low_open, bool high_open,
+                    std::string_view unit) const {
+  return internal::ReadNumber(*tree_, low, high, low_open, high_open, unit);
 }
 
 std::int64_t Node::Integer(std::int64_t low, std::int64_t high) const {
   return internal::ReadInteger(*tree_, low, high);
 }
 
-std::vector<double> Node::Numbers(int size) const {
+std::vector<double> Node::Numbers(int size, std::string_view unit) const {
   std::vector<double> numbers;
   if (kind() != Kind::kList) {
     const std::string expected = size < 0 || size == 1
                                      ? "a number or a list of numbers"
                                      : "a list of " + std::to_string(size) + " numbers";
-    numbers.push_back(internal::ReadNumber(*tree_, expected));
+    numbers.push_back(internal::ReadNumber(*tree_, expected, unit));
   } else {
-    for (const Node& item : Items()) numbers.push_back(item.Number());
+    for (const Node& item : Items()) {
+      numbers.push_back(internal::ReadNumber(item.tree(), "a number", unit));
+    }
   }
   if (size < 0 && numbers.empty()) Fail("the list is empty", "at least one number");
   if (size >= 0 && numbers.size() != static_cast<std::size_t>(size)) {

@@ -205,7 +205,7 @@ class TreeBuilder : public YAML::EventHandler {
   [[noreturn]] void FailSyntax(const YAML::Exception& error) const {
     const std::string message = "not valid YAML: " + RewordMessage(error.msg);
     if (stack_.empty() || error.msg.find("flow not found") == std::string::npos) {
-      Fail(error.mark, message);
+      Fail(error.mark, message, error.msg == "end of map not found" ? Indentation() : "");
     }
     const ConfigTree& unclosed = *stack_.back().node;
     FailAt(unclosed.place, FullPath({}), message);
@@ -228,6 +228,16 @@ class TreeBuilder : public YAML::EventHandler {
   Place PlaceOf(const YAML::Mark& mark) const {
     if (!origin_.has_lines) return Place{origin_.file};
     return Place{origin_.file, mark.line + 1, mark.column + 1};
+  }
+
+  /// Returns a text about the indentation of the map being read, or "" if it has no keys yet.
+  std::string Indentation() const {
+    if (!origin_.has_lines || stack_.empty() || stack_.back().node->children.empty()) return {};
+    const ConfigTree& map = *stack_.back().node;
+    const int spaces = map.children.front()->key_column - 1;
+    if (PathOf(map).empty()) return "a key of the file in column 1";
+    return std::to_string(spaces) + (spaces == 1 ? " space" : " spaces") + " before each key of " +
+           Quoted(PathOf(map));
   }
 
   /// Returns the key path of the value being read, or of `key` in the map being read.

@@ -56,7 +56,8 @@ void CheckPositive(const Node& node, const Eigen::MatrixXd& covariance) {
 
 std::vector<double> ReadCovariance(const Node& node, int size) {
   const std::string expected =
-      std::to_string(size) + " rows of " + std::to_string(size) + " numbers";
+      size == 1 ? "a list of one row of one number, as in [[0.01]]"
+                : std::to_string(size) + " rows of " + std::to_string(size) + " numbers";
   if (node.kind() != Node::Kind::kList) node.Fail("not a list of rows", expected);
   const std::vector<Node> rows = node.Items();
   if (rows.size() != static_cast<std::size_t>(size)) {

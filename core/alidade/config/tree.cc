@@ -57,14 +57,6 @@ std::string Quoted(std::string_view text) {
   return quoted + (end < text.size() ? "...'" : "'");
 }
 
-std::string LowerCase(std::string_view text) {
-  std::string lower(text);
-  for (char& c : lower) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return lower;
-}
-
 void FailAt(const Place& place, std::string_view key, std::string_view message,
             std::string_view expected, std::string_view suggestion) {
   throw Error(ExitCode::kBadConfig, ErrorLine(place, key, message, expected, suggestion));

@@ -70,8 +70,6 @@ std::unique_ptr<ConfigTree> Clone(const ConfigTree& tree);
 std::string ToYaml(const ConfigTree& root);
 
 inline bool IsDigit(char c) { return c >= '0' && c <= '9'; }
-/// Returns `text` with its ASCII letters in lower case, in any locale.
-std::string LowerCase(std::string_view text);
 
 /// Returns `text` in single quotes, for a message. Escapes control characters and replaces the part
 /// after the first 60 bytes by `...`.

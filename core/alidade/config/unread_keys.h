@@ -12,9 +12,10 @@
 namespace alidade::internal {
 
 /// Throws the error of the missing `key`. The message reports that `needed_by` needs the key,
-/// unless `needed_by` is empty.
+/// unless `needed_by` is empty. If `map` contains a similar unknown key, the message names this
+/// key; otherwise it contains `expected`.
 [[noreturn]] void FailMissing(const ConfigTree& map, std::string_view key,
-                              std::string_view needed_by);
+                              std::string_view needed_by, std::string_view expected);
 
 /// Appends an error line for each unknown key of `map` and of each nested map from which at least
 /// one key was read. Stops after 20 lines.

@@ -216,7 +216,7 @@ double NumberOrNone(const AlidadeParam& param, const Node& node, bool is_low_ope
                     bool is_high_open) {
   if (node.kind() == Node::Kind::kScalar && node.Text() == "none") return kInfinity;
   try {
-    return node.Number(param.low, param.high, is_low_open, is_high_open);
+    return node.Number(param.low, param.high, is_low_open, is_high_open, Text(param.unit));
   } catch (const Error& e) {
     throw Error(e.code(), std::string(e.what()) + ", or none");
   }
@@ -237,7 +237,7 @@ double ReadValue(const AlidadeParam& param, const Node& node) {
     default:
       return (param.flags & ALIDADE_PARAM_OR_NONE) != 0
                  ? NumberOrNone(param, node, is_low_open, is_high_open)
-                 : node.Number(param.low, param.high, is_low_open, is_high_open);
+                 : node.Number(param.low, param.high, is_low_open, is_high_open, Text(param.unit));
   }
 }
 
@@ -245,7 +245,7 @@ std::vector<double> ReadValues(const AlidadeParam& param, const Node& node) {
   if (param.count == 1) return {ReadValue(param, node)};
   const std::vector<Node> items = node.ItemsOrOne();
   if (param.kind == ALIDADE_PARAM_NUMBER) {
-    static_cast<void>(node.Numbers(param.count));
+    static_cast<void>(node.Numbers(param.count, Text(param.unit)));
   } else if (param.count > 0 && std::ssize(items) != param.count) {
     node.Fail("has " + std::to_string(items.size()) + (items.size() == 1 ? " value" : " values"),
               std::to_string(param.count));

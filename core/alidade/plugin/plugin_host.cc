@@ -21,6 +21,7 @@ namespace alidade {
 namespace fs = std::filesystem;
 namespace {
 
+using internal::Join;
 using internal::Refuse;
 using internal::Text;
 using internal::WithArticle;
@@ -199,11 +200,17 @@ void PluginHost::FailMissing(const std::string& kind, const std::string& name,
       problem += "; '" + refusal.file.string() + "' was refused because it is not trusted";
     }
   }
+  const std::string nearest = Nearest(name, names);
+  std::ranges::sort(names);
+  std::string expected = (names.size() > 1 ? "one of " : "") + Join(names);
   std::string places = PluginPlaces(*this);
   if (!places.empty()) places.insert(0, "\n").pop_back();
-  throw Error(
-      code,
-      ErrorLine(location.place(), location.path(), problem, {}, Nearest(name, names)) + places);
+  if (!nearest.empty()) {
+    expected.clear();
+    if (refusals_.empty()) places.clear();
+  }
+  throw Error(code,
+              ErrorLine(location.place(), location.path(), problem, expected, nearest) + places);
 }
 
 SharedSensor PluginHost::CreateSensor(const std::string& name, const Node& entry,

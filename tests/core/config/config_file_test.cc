@@ -193,8 +193,13 @@ TEST(ConfigFile, RefusesOddKeysAndTags) {
 TEST(ConfigFile, SyntaxErrorsHavePlaceAndKey) {
   EXPECT_EQ(TextError("a:\n  b: [1, 2\n"),
             "78 f:2:6 a.b: not valid YAML: '[' is not closed, or a comma is missing");
-  EXPECT_EQ(TextError("a:\n    b: 1\n  c: 2\n"),
-            "78 f:3:3: not valid YAML: wrong indentation, or text after a value");
+  EXPECT_EQ(
+      TextError("a:\n    b: 1\n  c: 2\n"),
+      "78 f:3:3: not valid YAML: wrong indentation, or text after a value; expected a key of the "
+      "file in column 1");
+  EXPECT_EQ(TextError("a:\n  b:\n    c: 1\n   d: 2\n"),
+            "78 f:4:4 a: not valid YAML: wrong indentation, or text after a value; expected 2 "
+            "spaces before each key of 'a'");
   EXPECT_EQ(TextError("a: *nothing"),
             "78 f:1:4 a: not valid YAML: the referenced anchor is not defined");
   EXPECT_EQ(TextError("a:1"), "78 f:1:1: 'a:1'; expected a map of keys, as in 'key: value'");

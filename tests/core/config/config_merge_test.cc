@@ -60,6 +60,30 @@ TEST(ConfigSet, ErrorsAboutTheValueNameTheOrigin) {
             "--set source.sede: unknown key; did you mean 'seed'?");
 }
 
+// A misspelt name must not create a new estimator, sensor or state entry.
+TEST(ConfigSet, ANewEntryIsAWholeMap) {
+  Config config = Read("estimators: {ekf: {type: ekf}}\nsensors: {}\n");
+  const auto error = [&](const char* key, const char* value) {
+    return Message([&] { config.Set(key, value, "--set"); });
+  };
+  EXPECT_EQ(error("estimators.efk.gate", "0.9"),
+            "--set estimators.efk.gate: estimator 'efk' does not exist; expected ekf, or a whole "
+            "new entry, as in estimators.efk={KEY: VALUE}; did you mean 'ekf'?");
+  EXPECT_EQ(error("sensors.gps.sigma_m", "1"),
+            "--set sensors.gps.sigma_m: sensor 'gps' does not exist; expected a whole new entry, "
+            "as in sensors.gps={KEY: VALUE}");
+  EXPECT_EQ(
+      error("state.cam.noise.x", "1"),
+      "--set state.cam.noise.x: state entry 'cam' does not exist; expected a whole new entry, "
+      "as in state.cam={KEY: VALUE}");
+  config.Set("estimators.ekf.rejection_recovery.after", "5", "--set");
+  config.Set("estimators.ukf", "{type: ukf}", "--set");
+  config.Set("estimators.ukf.gate", "0.9", "--set");
+  config.Set("state", "{cam: {model: constant}}", "--set");
+  config.Set("state.cam.size", "2", "--set");
+  EXPECT_EQ(config.root().At("state").At("cam").At("size").Number(), 2.0);
+}
+
 TEST(ConfigSet, ValueIsReadStrictly) {
   EXPECT_EQ(SetError("a.x", "{k: 1, k: 2}"), "--set a.x.k: duplicate key");
   EXPECT_EQ(SetError("a.x", "[1"),

@@ -57,6 +57,23 @@ TEST(Nearest, IsEmptyWhereNothingIsNear) {
   EXPECT_EQ(Nearest("seed", words), "");
 }
 
+TEST(Nearest, DoesNotDependOnTheCase) {
+  const std::vector<std::string> words = {"iekf", "ukf"};
+  EXPECT_EQ(Nearest("UKF", words), "ukf");
+}
+
+TEST(Nearest, FindsAbbreviations) {
+  const std::vector<std::string> words = {"sigma_px", "target.depth", "heading", "focal_px"};
+  EXPECT_EQ(Nearest("sigma", words), "sigma_px");
+  EXPECT_EQ(Nearest("depth", words), "target.depth");
+  EXPECT_EQ(Nearest("hdg", words), "heading");
+  EXPECT_EQ(Nearest("focal_length_px", words), "focal_px");
+  EXPECT_EQ(Nearest("px", words), "");            // too short
+  EXPECT_EQ(Nearest("length_depth", words), "");  // its letters occur in none of the words
+  // A typing error is more probable than an abbreviation.
+  EXPECT_EQ(Nearest("rate", std::vector<std::string>{"rate_limit_hz", "rates"}), "rates");
+}
+
 TEST(Expects, ThrowsContractViolation) {
   EXPECT_NO_THROW(ALIDADE_EXPECTS(1 + 1 == 2));
   EXPECT_THROW(ALIDADE_EXPECTS(1 + 1 == 3), ContractViolation);
@@ -78,7 +95,7 @@ TEST(Node, NumberReadsPlainDecimals) {
 TEST(Node, NumberRefusesTrailingText) {
   EXPECT_EQ(Message([] { Read("a: 1\nb: {c: 3.8x}").root().At("b").At("c").Number(); }),
             "f.yaml:2:8 b.c: '3.8x' is not a finite number; expected a number");
-  for (const char* text : {"3.8 px", "1_000", "0x10", "1e", "1e+", "--1", "+-1", ".", "1,5"}) {
+  for (const char* text : {"3.8 pt", "1_000", "0x10", "1e", "1e+", "--1", "+-1", ".", "1,5"}) {
     EXPECT_NE(NumberError(text).find("is not a finite number"), std::string::npos) << text;
   }
 }
@@ -222,10 +239,66 @@ TEST(Node, UnknownKeyNamesTheNearestOne) {
   stereo.At("sigma_px");
   EXPECT_EQ(Message([&] { stereo.RejectUnread(); }),
             "f.yaml:3:3 stereo.focla_px: unknown key; did you mean 'focal_px'?\n"
-            "f.yaml:5:3 stereo.seed: unknown key; expected focal_px");
+            "f.yaml:5:3 stereo.seed: unknown key; expected one of focal_px, sigma_px");
   stereo.Declare("focla_px");
   stereo.Declare("seed");
   EXPECT_NO_THROW(stereo.RejectUnread());
+}
+
+TEST(Node, UnknownKeyListsTheKeysThatTheMapContains) {
+  const Config config = Read("{focal_px: 400, sigma: 2, x: 1}");
+  for (const char* key : {"focal_px", "covariance", "sigma_px"}) config.root().Find(key);
+  EXPECT_EQ(Message([&] { config.root().RejectUnread(); }),
+            "f.yaml:1:17 sigma: unknown key; did you mean 'sigma_px'?\n"
+            "f.yaml:1:27 x: unknown key; expected one of covariance, focal_px, sigma_px");
+}
+
+TEST(Node, AMapIsShownByAnExample) {
+  const Config config = Read("a: 1\nb: {c: 1}");
+  EXPECT_EQ(Message([&] { config.root().At("a").ExpectMap("{mean: 0, sigma: 1}"); }),
+            "f.yaml:1:4 a: '1'; expected a map, as in {mean: 0, sigma: 1}");
+  EXPECT_NO_THROW(config.root().At("b").ExpectMap("{c: 1}"));
+}
+
+TEST(Node, ANumberWithAUnitIsConverted) {
+  const Config config =
+      Read("{baseline_m: 65mm, rate_deg_s: 1rad/s, rate: 3deg, sigma: 5 s, list: [1cm], size: 5x}");
+  const auto error = [&](const char* key, const char* unit) {
+    return Message([&] { config.root().At(key).Number(0.0, 10.0, true, false, unit); });
+  };
+  EXPECT_EQ(error("baseline_m", ""),
+            "f.yaml:1:14 baseline_m: '65mm' contains a unit; expected a number in (0, 10] (m), "
+            "without a unit: 0.065");
+  EXPECT_EQ(error("rate_deg_s", ""),
+            "f.yaml:1:32 rate_deg_s: '1rad/s' contains a unit; expected a number in (0, 10] "
+            "(deg/s), without a unit: 57.2957795");
+  EXPECT_EQ(error("rate", ""),
+            "f.yaml:1:46 rate: '3deg' contains a unit; expected a number in (0, 10] (rad), without "
+            "a unit: 0.0523598776");
+  // Seconds cannot be converted to pixels.
+  EXPECT_EQ(error("sigma", "px"),
+            "f.yaml:1:59 sigma: '5 s' contains a unit; expected a number in (0, 10] (px), without "
+            "a unit");
+  EXPECT_EQ(Message([&] { config.root().At("list").Numbers(-1, "m"); }),
+            "f.yaml:1:71 list[0]: '1cm' contains a unit; expected a number (m), without a unit: "
+            "0.01");
+  EXPECT_EQ(error("size", "px"),
+            "f.yaml:1:83 size: '5x' is not a finite number; expected a number in (0, 10] (px)");
+}
+
+TEST(Node, AProbabilityAboveOneIsExplained) {
+  const auto error = [](const char* value) {
+    const Config config = Read("gate: " + std::string(value));
+    return Message([&] { config.root().At("gate").Number(0.0, 1.0, true, true); });
+  };
+  const std::string expected = "; expected a number in (0, 1)";
+  EXPECT_EQ(error("99.9"), "f.yaml:1:7 gate: '99.9' is out of range: 99.9 % is 0.999" + expected);
+  EXPECT_EQ(error("3"),
+            "f.yaml:1:7 gate: '3' is out of range: 3 % is 0.03, and the probability of 3 sigma is "
+            "0.9973" +
+                expected);
+  EXPECT_EQ(error("1"), "f.yaml:1:7 gate: '1' is out of range" + expected);
+  EXPECT_EQ(error("300"), "f.yaml:1:7 gate: '300' is out of range" + expected);
 }
 
 TEST(Node, MissingKeyNamesWhoNeedsIt) {
@@ -235,7 +308,11 @@ TEST(Node, MissingKeyNamesWhoNeedsIt) {
   EXPECT_EQ(Message([&] { stereo.At("baseline_m", "stereo_disparity"); }),
             "f.yaml:2:3 sensors.stereo.baseline_m: missing key, needed by stereo_disparity");
   EXPECT_EQ(Message([&] { stereo.At("focal_px"); }),
-            "f.yaml:2:3 sensors.stereo.focal_px: missing key; found 'focla_px' at line 4");
+            "f.yaml:2:3 sensors.stereo.focal_px: missing key; found 'focla_px' at line 4; did you "
+            "mean 'focal_px'?");
+  EXPECT_EQ(Message([&] { stereo.At("roles", "a sensor", "roles: {ROLE: BLOCK}"); }),
+            "f.yaml:2:3 sensors.stereo.roles: missing key, needed by a sensor; expected roles: "
+            "{ROLE: BLOCK}");
   EXPECT_EQ(Message([&] { config.root().At("source"); }), "f.yaml:1:1 source: missing key");
 }
 
@@ -248,7 +325,8 @@ TEST(Node, WrongUnitNamesTheRightOne) {
             "f.yaml:1:19 rate_deg_s: wrong unit 'deg_s'; expected rate_rad_s");
   // Pixels cannot be converted to metres. sigma_m may be a key that the program reads later.
   EXPECT_EQ(Message([&] { root.At("sigma_px"); }),
-            "f.yaml:1:1 sigma_px: missing key; found 'sigma_m' at line 1");
+            "f.yaml:1:1 sigma_px: missing key; found 'sigma_m' at line 1; did you mean "
+            "'sigma_px'?");
   const std::string rejected = Message([&] { root.RejectUnread(); });
   EXPECT_NE(rejected.find("f.yaml:1:34 sigma_m: wrong unit 'm'; expected sigma_px"),
             std::string::npos);

@@ -281,7 +281,7 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
       {"role 'x' uses reserved members", [](HandWritten& h) { h.role.reserved0 = 1; }},
       {"role 'x' is the value at an earlier timestamp, which this version",
        [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_CLONE; }},
-      {"role 'x' has a prior and dynamics, but is not a state",
+      {"role 'x' has a prior and dynamics, but is not a model parameter state",
        [](HandWritten& h) {
          h.Own();
          h.role.flags = 0;
@@ -320,22 +320,22 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
        [](HandWritten& h) { h.description.capabilities = ALIDADE_RESIDUAL_ONLY; }},
       {"claims to initialise a role, but does not define",
        [](HandWritten& h) { h.description.capabilities = ALIDADE_CAN_INITIALISE; }},
-      {"eval, sqrt_noise", [](HandWritten& h) { h.sensor.eval = nullptr; }},
-      {"eval, sqrt_noise", [](HandWritten& h) { h.sensor.struct_size = 8; }},
-      {"eval, sqrt_noise",
+      {"eval or sqrt_noise", [](HandWritten& h) { h.sensor.eval = nullptr; }},
+      {"eval or sqrt_noise", [](HandWritten& h) { h.sensor.struct_size = 8; }},
+      {"eval or sqrt_noise",
        [](HandWritten& h) {
          h.sensor.sqrt_noise = nullptr;
          h.sensor.residual = [](const void*, const AlidadeObservation*, const double* const*,
                                 double*, double* const*,
                                 const std::int32_t*) { return std::int32_t{0}; };
        }},
-      {"step, sqrt_q",
+      {"step or sqrt_q",
        [](HandWritten& h) {
          static constexpr AlidadeMotion kNoStep{sizeof(AlidadeMotion), 0, nullptr, nullptr, {}};
          h.instance.kind = ALIDADE_KIND_MOTION;
          h.instance.motion = &kNoStep;
        }},
-      {"lacks the functions of its kind", [](HandWritten& h) { h.instance.sensor = nullptr; }},
+      {"lacks the functions of this kind", [](HandWritten& h) { h.instance.sensor = nullptr; }},
       {"is of kind 3", [](HandWritten& h) { h.instance.kind = 3; }},
   };
   for (const Spoiled& test : cases) {

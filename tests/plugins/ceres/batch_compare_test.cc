@@ -216,8 +216,16 @@ Config Depth(const std::vector<std::pair<std::string, std::string>>& settings = 
   return config;
 }
 
+/// Returns options with which the added estimators do not depend on the speed of the machine.
+CompareOptions With(FullInformation condition) {
+  CompareOptions options;
+  options.full_information = condition;
+  return options;
+}
+
 TEST(BuildComparedExperiment, AddsWhatTheComparisonLacks) {
-  const ComparedExperiment compared = BuildComparedExperiment(Depth(), Shipped(), {});
+  const ComparedExperiment compared =
+      BuildComparedExperiment(Depth(), Shipped(), With(FullInformation::kAlways));
   EXPECT_EQ(compared.filter, "ekf");
   EXPECT_EQ(compared.added,
             (std::vector<std::string>{"rts", "batch", "full_information", "batch_accepted"}));
@@ -241,7 +249,8 @@ TEST(BuildComparedExperiment, TakesOverWhatTheFilterSees) {
   const Config config = Depth({{"estimators.ekf.sensors", "[stereo]"},
                                {"estimators.ekf.overrides.sensors.stereo.sigma_px", "2"},
                                {"estimators.best", "{type: ceres_batch}"}});
-  const ComparedExperiment compared = BuildComparedExperiment(config, Shipped(), {});
+  const ComparedExperiment compared =
+      BuildComparedExperiment(config, Shipped(), With(FullInformation::kAlways));
   // `best` has a different sensor and a different noise.
   EXPECT_EQ(compared.added,
             (std::vector<std::string>{"rts", "batch", "full_information", "batch_accepted"}));
@@ -249,6 +258,34 @@ TEST(BuildComparedExperiment, TakesOverWhatTheFilterSees) {
     EXPECT_EQ(named.problem.sensors.size(), named.name == "best" ? 2u : 1u) << named.name;
     EXPECT_EQ(named.overrides.empty(), named.name == "best") << named.name;
   }
+}
+
+// A solve at every frame takes more than half of the time. Over 10^7 runs it takes more than 10 s
+// on any machine.
+TEST(BuildComparedExperiment, OmitsASlowFullInformationFilter) {
+  const std::vector<std::string> others = {"rts", "batch", "batch_accepted"};
+  CompareOptions options;
+  options.over_seeds = true;
+  options.runs = 10'000'000;
+  const ComparedExperiment slow = BuildComparedExperiment(Depth(), Shipped(), options);
+  EXPECT_EQ(slow.added, others);
+  EXPECT_TRUE(slow.too_slow.starts_with(
+      "the comparison omits the full-information filter: it would take about "))
+      << slow.too_slow;
+  EXPECT_TRUE(slow.too_slow.ends_with("; --full-information always includes it")) << slow.too_slow;
+  // The prediction has read the first frames of the source, so the experiment must be a new one.
+  SourceFrame frame;
+  ASSERT_TRUE(slow.experiment.source->Next(frame));
+  EXPECT_EQ(frame.timestamp, TimestampFromSeconds(0.0));
+
+  options.full_information = FullInformation::kAlways;
+  const ComparedExperiment always = BuildComparedExperiment(Depth(), Shipped(), options);
+  EXPECT_EQ(always.added.size(), 4u);
+  EXPECT_EQ(always.too_slow, "");
+  const ComparedExperiment never =
+      BuildComparedExperiment(Depth(), Shipped(), With(FullInformation::kNever));
+  EXPECT_EQ(never.added, others);
+  EXPECT_EQ(never.too_slow, "");
 }
 
 TEST(BuildComparedExperiment, LeavesOutWithItsReasonWhatDoesNotSupportTheSystem) {
@@ -305,7 +342,8 @@ Comparison CompareScene(const std::string& more) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
   config.Set("source.max_frames", "6", "--set");
   if (!more.empty()) config.Set("estimators.now", more, "--set");
-  ComparedExperiment compared = BuildComparedExperiment(config, Shipped(), {});
+  ComparedExperiment compared =
+      BuildComparedExperiment(config, Shipped(), With(FullInformation::kNever));
   RunComparer comparer(compared.experiment);
   RunOptions observed;
   observed.observers.push_back(&comparer);

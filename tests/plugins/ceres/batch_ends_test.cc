@@ -399,8 +399,8 @@ TEST(CeresBatchEnds, AUnitVectorMayCrossTheSeamOfItsBasis) {
 // Example 05 has 152 frames. The batch checks for a stop request after each frame.
 TEST(CeresBatchEnds, AStopWhileItSolvesKeepsTheOthers) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/05_depth_principled/config.yaml");
-  config.Set("estimators.batch.type", "ceres_batch", "--set");
-  config.Set("estimators.rts.type", "rts", "--set");
+  config.Set("estimators.batch", "{type: ceres_batch}", "--set");
+  config.Set("estimators.rts", "{type: rts}", "--set");
   for (const int after : {152, 155}) {
     Experiment experiment = BuildExperiment(config, Shipped());
     int asked = 0;

@@ -141,7 +141,7 @@ TEST_F(CeresBatchConfig, BadOptionsAndTypesAreErrorsWithAPlace) {
   ExpectError(
       ExitCode::kPlugin,
       {"estimators.batch.type", "estimator type 'ceres_bach' is neither built in nor in a plugin",
-       "ekf", "ceres_batch", "searched"},
+       "ekf", "ceres_batch"},
       [&] { run("estimators.batch.type", "ceres_bach"); });
 }
 

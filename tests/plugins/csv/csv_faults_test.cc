@@ -13,7 +13,7 @@ namespace {
 // Tests fault 27 of tests/faults/README.md.
 TEST_F(Csv, WrongNumberOfColumns) {
   ExpectBadData(std::string("# c\n") + kHeader + "0,1,2,3\n1,2,3\n",
-                "FILE:4:6: 3 columns; expected 4 columns, as in line 2");
+                "FILE:4:6: the line has 3 columns; expected 4 columns, as in line 2");
   ExpectBadData(std::string(kHeader) + "0,1,2,3,4\n",
                 "FILE:2:9: the line has 5 columns; expected 4 columns, as in line 1");
 }
@@ -35,14 +35,15 @@ TEST_F(Csv, TruncatedLastLine) {
 
 // Tests fault 28 of tests/faults/README.md.
 TEST_F(Csv, NotANumber) {
-  const auto expect = [&](const std::string& cell) {
+  const auto expect = [&](const std::string& cell, const std::string& hint) {
     ExpectBadData(
         std::string(kHeader) + "0, " + cell + ",2,3\n",
-        "FILE:2:3 disparity_px: '" + cell + "' is not a number; expected a finite number");
+        "FILE:2:3 disparity_px: '" + cell + "' is not a number; expected a finite number" + hint);
   };
-  for (const char* cell : {"abc", "6.5x", "0x10", "1.5.2", "+-1", "--1", "+", "1e", "1 2"}) {
-    expect(cell);
-  }
+  // A word may mark a missing value. A cell with a digit cannot.
+  expect("abc", ", or 'source.missing: [\"\", abc]'");
+  expect("+", ", or 'source.missing: [\"\", \"+\"]'");
+  for (const char* cell : {"6.5x", "0x10", "1.5.2", "+-1", "--1", "1e", "1 2"}) expect(cell, "");
 }
 
 TEST_F(Csv, ShowsHostileCellsHarmlessly) {
@@ -50,7 +51,8 @@ TEST_F(Csv, ShowsHostileCellsHarmlessly) {
                 "FILE:2:3 disparity_px: '?[31m" + std::string(35, 'y') +
                     "...' is not a number; expected a finite number");
   ExpectBadData(std::string(kHeader) + "0," + std::string(1, '\0') + ",2,3\n",
-                "FILE:2:3 disparity_px: '?' is not a number; expected a finite number");
+                "FILE:2:3 disparity_px: '?' is not a number; expected a finite number, or "
+                "'source.missing: [\"\", \"?\"]'");
 }
 
 // Tests fault 29 of tests/faults/README.md.
@@ -58,8 +60,8 @@ TEST_F(Csv, NotFinite) {
   for (const std::string cell : {"nan", "inf", "-inf", "NaN", "Infinity"}) {
     ExpectBadData(std::string(kHeader) + "0,1," + cell + ",3\n",
                   "FILE:2:5 scale: '" + cell +
-                      "' is not finite; expected a finite number, or 'source.missing: " + cell +
-                      '\'');
+                      "' is not finite; expected a finite number, or 'source.missing: [\"\", " +
+                      (cell == "-inf" ? "\"-inf\"" : cell) + "]'");
   }
   ExpectBadData(std::string(kHeader) + "nan,1,2,3\n",
                 "FILE:2:1 t_s: 'nan' is not finite; expected a finite number");
@@ -123,7 +125,7 @@ TEST_F(Csv, TimeBeyondTheTimestamps) {
                 "FILE:2:1 t_s: '9.3e9' is beyond 292 years; expected -9.2e9 s to 9.2e9 s, or "
                 "another unit, such as 'source.time: {unit: ns}'");
   ExpectBadData(std::string(kHeader) + ",1,2,3\n",
-                "FILE:2:1 t_s: '' is not a number; expected a finite number");
+                "FILE:2:1 t_s: '' is an empty cell; expected a finite number");
 }
 
 // Tests fault 43 of tests/faults/README.md.

@@ -25,7 +25,9 @@ TEST_F(Csv, DashIsStandardInput) {
     const auto source = OpenConfig();
     SourceFrame frame;
     EXPECT_TRUE(source->Next(frame));
-    ExpectError(ExitCode::kBadData, "<stdin>:3:3 z: 'x' is not a number; expected a finite number",
+    ExpectError(ExitCode::kBadData,
+                "<stdin>:3:3 z: 'x' is not a number; expected a finite number, or "
+                "'source.missing: [\"\", x]'",
                 [&] { source->Next(frame); });
     dup2(kept, STDIN_FILENO);
     close(kept);

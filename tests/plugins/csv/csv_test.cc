@@ -105,7 +105,9 @@ TEST_F(Csv, AFrameBeforeABadRowIsGivenOutWhereItIsWhole) {
   SourceFrame frame;
   ASSERT_TRUE(source->Next(frame));
   EXPECT_EQ(Held(frame), "0 0 |");
-  ExpectError(ExitCode::kBadData, "FILE:4:3 r: 'x' is not a number; expected a finite number",
+  ExpectError(ExitCode::kBadData,
+              "FILE:4:3 r: 'x' is not a number; expected a finite number, or "
+              "'source.missing: [\"\", x]'",
               [&] { source->Next(frame); });
   ExpectBadData("t_s,r\n1,21\n0,22\n",
                 "FILE:3:1 t_s: '0' is earlier than in line 2; expected increasing times, or "
@@ -175,7 +177,10 @@ TEST_F(Csv, MissingWordsReplaceTheEmptyCell) {
   const std::string config = "path: a.csv\nmissing: [nan, \"-\"]\nstreams: {z: z}\n";
   const auto frames = Frames("t_s,z\n0,nan\n1,-\n2,3\n", config);
   EXPECT_EQ(Held(frames[0]) + Held(frames[1]) + Held(frames[2]), "||0 |");
-  ExpectBadData("t_s,z\n0,\n", "FILE:2:3 z: '' is not a number; expected a finite number", config);
+  ExpectBadData("t_s,z\n0,\n",
+                "FILE:2:3 z: '' is an empty cell; expected a finite number, or "
+                "'source.missing: [nan, \"-\", \"\"]'",
+                config);
 }
 
 TEST_F(Csv, TimeHasAUnit) {
@@ -207,8 +212,8 @@ TEST_F(Csv, RateStandsInForTime) {
   const auto frames = Frames("z\n1\n\n2\n", config);  // a blank line is a missing value
   EXPECT_EQ(Timestamps(frames), (std::vector<Timestamp>{0, 33'333'333, 66'666'667}));
   EXPECT_EQ(Held(frames[1]), "|");
-  ExpectBadData("z,w\n1,2\n\n2,3\n", "FILE:3:1: 1 column; expected 2 columns, as in line 1",
-                config);
+  ExpectBadData("z,w\n1,2\n\n2,3\n",
+                "FILE:3:1: the line has 1 column; expected 2 columns, as in line 1", config);
 }
 
 TEST_F(Csv, NumbersDoNotDependOnTheLocale) {

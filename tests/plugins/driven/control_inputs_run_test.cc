@@ -224,10 +224,10 @@ TEST_F(DrivenTest, WhatIsNotAnInputIsRefusedWithItsPlace) {
       "the size of the control input 'speed' of model 'driven'");
   EXPECT_EQ(Refusal("state.car", "{model: driven, noise: {speed: 0.2}, initial: {}}"),
             "--set state.car.input: missing key, needed by the control input speed of model "
-            "driven");
+            "driven; expected input: {stream: NAME}");
   EXPECT_EQ(Refusal("state.car.input", "odometry"),
-            "--set state.car.input: the value is not a map; expected {stream: NAME}, or "
-            "{stream: NAME, timeout_s: S}");
+            "--set state.car.input: 'odometry'; expected a map, as in {stream: NAME}, or {stream: "
+            "NAME, timeout_s: S}");
   EXPECT_EQ(Refusal("state.car.input", "{timeout_s: 1}"),
             "--set state.car.input.stream: missing key, needed by the control input speed of "
             "model driven");
@@ -258,10 +258,10 @@ TEST_F(DrivenTest, ExplainShowsWhereTheInputComesFrom) {
 }
 
 TEST_F(DrivenTest, TheModelPassesTheChecker) {
-  for (const Finding& finding :
+  for (const CheckResult& finding :
        CheckModel(FindModels(host_, Built("driven").string(), "driven").at(0),
                   Config::FromText("noise: {speed: 0.2}", "driven").root(), {})) {
-    EXPECT_NE(finding.verdict, Finding::Verdict::kFail) << finding.check << ' ' << finding.text;
+    EXPECT_NE(finding.verdict, CheckResult::Verdict::kFail) << finding.check << ' ' << finding.text;
   }
 }
 

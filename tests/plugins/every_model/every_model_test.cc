@@ -53,7 +53,7 @@ TEST_P(EveryModel, PassesTheChecker) {
   for (const PluginEntry& entry : FindModels(Shipped(), row_.model)) {
     CheckOptions options;
     options.timeout_s = 300.0;  // long enough for a busy machine and for sanitizers
-    const std::vector<Finding> findings = CheckModel(entry, parameters_.root(), options);
+    const std::vector<CheckResult> findings = CheckModel(entry, parameters_.root(), options);
     EXPECT_FALSE(AnyFailure(findings)) << CheckText(entry, findings);
   }
 }

@@ -15,12 +15,12 @@
 namespace alidade {
 namespace {
 
-using Verdict = Finding::Verdict;
+using Verdict = CheckResult::Verdict;
 
 /// Returns `CHECK: TEXT` of every failure.
-std::vector<std::string> Failures(const std::vector<Finding>& findings) {
+std::vector<std::string> Failures(const std::vector<CheckResult>& findings) {
   std::vector<std::string> failures;
-  for (const Finding& finding : findings) {
+  for (const CheckResult& finding : findings) {
     if (finding.verdict == Verdict::kFail) failures.push_back(finding.check + ": " + finding.text);
   }
   return failures;
@@ -34,7 +34,7 @@ std::string Joined(const std::vector<std::string>& lines) {
 
 class CheckTest : public HostTest {
  protected:
-  std::vector<Finding> Checked(const std::string& model, const CheckOptions& options = {}) {
+  std::vector<CheckResult> Checked(const std::string& model, const CheckOptions& options = {}) {
     return CheckModel(FindModels(host_, Built("bad_models").string(), model).at(0),
                       Config::FromText("{}", model).root(), options);
   }
@@ -209,7 +209,7 @@ TEST_F(CheckTest, ADiscretisationPassesWhereItsOrderIsGiven) {
 
 TEST_F(CheckTest, NamesTheWorstEntryOfAWrongJacobian) {
   const auto findings = Checked("wrong_jacobian");
-  const auto is = [](const Finding& finding) { return finding.check == "jacobian"; };
+  const auto is = [](const CheckResult& finding) { return finding.check == "jacobian"; };
   const std::string words = std::find_if(findings.begin(), findings.end(), is)->text;
   double written = 0.0, numeric = 0.0, x = 0.0, y = 0.0;
   ASSERT_EQ(std::sscanf(words.c_str(),
@@ -225,9 +225,9 @@ TEST_F(CheckTest, NamesTheWorstEntryOfAWrongJacobian) {
 
 TEST_F(CheckTest, SkipsWhatAFailureLeavesUnsaid) {
   const auto findings = Checked("not_deterministic");
-  const auto failed = std::find_if(findings.begin(), findings.end(), [](const Finding& finding) {
-    return finding.verdict == Verdict::kFail;
-  });
+  const auto failed =
+      std::find_if(findings.begin(), findings.end(),
+                   [](const CheckResult& finding) { return finding.verdict == Verdict::kFail; });
   ASSERT_NE(failed, findings.end());
   for (auto later = failed + 1; later != findings.end(); ++later) {
     EXPECT_EQ(later->verdict, Verdict::kSkipped) << later->check;

@@ -85,7 +85,7 @@ TEST_F(ThrowsTest, InErrorTextIsSaidInItsPlace) {
   const double below = -1.0;
   const double* const roles[] = {&below};
   EXPECT_EQ(sensor->Predict(roles, &out_), Status::kError);
-  EXPECT_EQ(sensor->error_text(), Words("error_text", "throws_in_error_text"));
+  EXPECT_EQ(sensor->error_text(), Words("function error_text", "throws_in_error_text"));
 }
 
 TEST_F(ThrowsTest, InDestroyIsAWarning) {
@@ -93,7 +93,7 @@ TEST_F(ThrowsTest, InDestroyIsAWarning) {
   const LogSubscription log(LogLevel::kWarning,
                             [&](LogLevel, std::string_view text) { said.emplace_back(text); });
   { const SharedSensor sensor = Sensor("throws_in_destroy_too"); }
-  EXPECT_EQ(said, std::vector<std::string>{Words("Destroy", "throws_in_destroy_too")});
+  EXPECT_EQ(said, std::vector<std::string>{Words("function destroy", "throws_in_destroy_too")});
 }
 
 TEST_F(ThrowsTest, InTheEntryFunctionIsARefusal) {

@@ -270,7 +270,7 @@ TEST(SensorStates, ATimeOffsetMayBeAParameter) {
   const RunResult constant = RunOf(Late("0.02")), known = RunOf(Late("{mean: 0.02, sigma: 0}"));
   for (std::size_t i = 0; i < constant.estimators.size(); ++i) {
     const double rmse = known.estimators[i].metrics.at("rmse:target.position");
-    const double relative = constant.estimators[i].name == "ukf" ? 1e-8 : 1e-10;
+    const double relative = constant.estimators[i].name == "ukf" ? 1e-6 : 1e-10;
     EXPECT_NEAR(constant.estimators[i].metrics.at("rmse:target.position"), rmse, relative * rmse)
         << constant.estimators[i].name;
   }

@@ -36,6 +36,7 @@ void AddSimulate(CLI::App& program, Action& action);
 void AddPlugins(CLI::App& program, Action& action);
 void AddCheck(CLI::App& program, Action& action);
 void AddEval(CLI::App& program, Action& action);
+void AddDiagnose(CLI::App& program, Action& action);
 void AddDoctor(CLI::App& program, Action& action);
 
 /// Arguments that name a config and the plugins that the config needs.

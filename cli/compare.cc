@@ -25,6 +25,7 @@ constexpr const char* kCompareFooter = R"(Examples:
   alidade compare config.yaml                      run the config and decompose a filter's error
   alidade compare config.yaml --runs 100           compare over seeds 1 to 100
   alidade compare config.yaml --runs 200 --budget 600   do as many runs as 10 min allow
+  alidade compare config.yaml --full-information always
   alidade compare config.yaml --no-decomposition --reference batch
   alidade compare runs/a runs/b                    compare finished runs over the same data
 
@@ -237,7 +238,10 @@ ExitCode CompareConfig(const CompareArguments& arguments) {
   const PluginHost host = input.Host(config);
   StopOnSignals();
   ComparedExperiment compared = BuildComparedExperiment(config, host, arguments.options);
-  if (!arguments.quiet) ReportOutput(output);
+  if (!arguments.quiet) {
+    ReportOutput(output);
+    if (!compared.too_slow.empty()) PrintNote(compared.too_slow);
+  }
   return arguments.options.over_seeds ? CompareOverSeeds(arguments, compared, host, output.folder)
                                       : CompareRun(arguments, compared, host, output.folder);
 }
@@ -271,11 +275,29 @@ bool AreFolders(const std::vector<std::string>& paths) {
 /// Rejects the options that finished runs do not support.
 void RejectRunOptions(const CLI::App& command) {
   for (const char* option : {"--runs", "--first-seed", "--jobs", "--seed", "--set", "--plugin-path",
-                             "--allow-outside", "--figures", "--budget"}) {
+                             "--allow-outside", "--figures", "--budget", "--full-information"}) {
     if (command.count(option) == 0) continue;
     throw CLI::ValidationError(option,
                                "finished runs do not support this option; expected a config");
   }
+}
+
+void AddFullInformation(CLI::App& command, CompareArguments& arguments) {
+  const auto read_condition = [&arguments](const std::string& text) {
+    arguments.options.full_information =
+        text == "always" ? FullInformation::kAlways : FullInformation::kNever;
+  };
+  command
+      .add_option_function<std::string>(
+          "--full-information", read_condition,
+          "whether to add the full-information filter, which solves a batch at every frame; "
+          "default: unless it would take 10 s or more, and more than half of the CPU time")
+      ->option_text("always|never")
+      ->check([](const std::string& text) {
+        return text == "always" || text == "never"
+                   ? std::string()
+                   : '\'' + text + "' is not a condition; expected always or never";
+      });
 }
 
 void AddOptions(CLI::App& command, CompareArguments& arguments) {
@@ -316,6 +338,7 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
                   "run, do not add an estimator that would exceed the limit")
       ->option_text("SECONDS")
       ->check(IsNumber(1e-9, 1e9));
+  AddFullInformation(command, arguments);
   AddSeed(command, arguments.seed)->excludes("--first-seed");
   AddSets(command, arguments.input.sets,
           "set a key of the config, such as source.seed=7; may be repeated");
@@ -352,6 +375,7 @@ void AddCompare(CLI::App& program, Action& action, const std::string& command_li
     if (folders) RejectRunOptions(command);
     arguments->options.decompose = !arguments->no_decomposition;
     arguments->options.over_seeds = command.count("--runs") > 0;
+    arguments->options.runs = arguments->sweep.runs;
     action = [arguments, folders] {
       return folders ? CompareFinished(*arguments) : CompareConfig(*arguments);
     };

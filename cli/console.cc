@@ -14,6 +14,7 @@
 
 #include "alidade/base/error.h"
 #include "alidade/io/utf8.h"
+#include "excerpt.h"
 
 namespace alidade::cli {
 namespace {
@@ -100,14 +101,18 @@ void Print(std::string_view text) {
 
 void PrintErrors(std::string_view text) {
   const bool colour = SupportsColour();
-  std::string lines;
+  std::string lines, last_excerpt;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     const std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
     if (line.empty()) continue;
-    if (line[0] != ' ') lines += FormatLabel("error", "31", colour);
+    const bool is_continued = line[0] == ' ';
+    if (!is_continued) lines += FormatLabel("error", "31", colour);
     lines.append(Sanitise(line)).append("\n");
+    const std::string excerpt = is_continued ? "" : Excerpt(line);
+    if (excerpt != last_excerpt) lines += Sanitise(excerpt);
+    last_excerpt = excerpt;
   }
   WriteError(lines);
 }

@@ -18,6 +18,8 @@ void PrepareConsole();
 void Print(std::string_view text);
 
 /// Prints `error: LINE` on standard error for each line. An indented line continues the line above.
+/// Each line that begins with a place in a file is followed by its Excerpt(), unless the line
+/// before it has the same excerpt.
 /// PrintErrors and PrintNote print `?` for each control character and each byte that is not UTF-8.
 void PrintErrors(std::string_view text);
 void PrintNote(std::string_view text);

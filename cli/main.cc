@@ -8,6 +8,7 @@
 
 #include "command.h"
 #include "console.h"
+#include "usage.h"
 
 namespace alidade::cli {
 namespace {
@@ -107,15 +108,14 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
   AddPlugins(program, action);
   AddCheck(program, action);
   AddEval(program, action);
+  AddDiagnose(program, action);
   AddDoctor(program, action);
   const auto polish = [&log_level](const auto& self, CLI::App& app) -> void {
     app.get_help_ptr()->description("print this help and exit");
-    if (app.get_subcommands({}).empty()) {
-      app.add_option("--log-level", log_level,
-                     std::string("minimum level of messages on standard error: ") + kLogLevels)
-          ->option_text("LEVEL")
-          ->check(IsLogLevel);
-    }
+    app.add_option("--log-level", log_level,
+                   std::string("minimum level of messages on standard error: ") + kLogLevels)
+        ->option_text("LEVEL")
+        ->check(IsLogLevel);
     for (CLI::App* command : app.get_subcommands({})) {
       command->group("Commands");
       self(self, *command);
@@ -128,32 +128,6 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
 const CLI::App& InnermostCommand(const CLI::App& app) {
   const auto chosen = app.get_subcommands();
   return chosen.empty() ? app : InnermostCommand(*chosen.front());
-}
-
-/// Returns `; did you mean '...'?` with the command or option closest to an unknown word, or "".
-std::string Suggestion(const CLI::App& app, const std::string& word) {
-  std::vector<std::string> names;
-  if (word.starts_with('-')) {
-    for (const CLI::Option* option : app.get_options()) {
-      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-    }
-  } else {
-    for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
-  }
-  const std::string nearest = Nearest(word.substr(0, word.find('=')), names);
-  return nearest.empty() ? "" : "; did you mean '" + nearest + "'?";
-}
-
-/// Returns the error message for a command line that CLI11 rejects.
-std::string UsageErrorText(const CLI::App& command, const CLI::ParseError& error) {
-  const std::vector<std::string> extra = command.remaining();
-  const bool needs_command = !command.get_subcommands({}).empty();
-  if (extra.empty()) return needs_command ? "a command is missing" : error.what();
-  const std::string& word = extra.front();
-  const char* const problem = word.starts_with('-') ? "unknown option '"
-                              : needs_command       ? "unknown command '"
-                                                    : "unexpected argument '";
-  return problem + word + "'" + Suggestion(command, word);
 }
 
 /// Returns the name of a command, preceded by the names of its parents, such as `alidade plugins
@@ -190,7 +164,7 @@ ExitCode Execute(const ArgumentList& arguments) {
   std::string log_level;
   Describe(program, action, CommandLine(arguments), log_level);
   try {
-    program.parse(ReversedArguments(arguments));
+    program.parse(ReversedArguments(WithCommonWords(arguments)));
   } catch (const CLI::ParseError& error) {
     return Fail(program, error);
   }

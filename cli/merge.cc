@@ -34,9 +34,10 @@ ExitCode Merge(const MergeArguments& arguments) {
       internal::MergeShards({arguments.shards.begin(), arguments.shards.end()});
   SweepFolder folder({path, arguments.force, merged.inputs}, merged.config);
   if (!merged.variation) {
-    return FinishSweep(folder, path, merged.results.front(), merged.config, arguments.quiet);
+    return FinishSweep(folder, path, merged.results.front(), merged.config, merged.inputs,
+                       arguments.quiet);
   }
-  const VariedSweep sweep{*merged.variation, merged.results};
+  const VariedSweep sweep{*merged.variation, merged.results, merged.warning};
   return FinishSweep(folder, path, sweep, merged.config, arguments.quiet);
 }
 

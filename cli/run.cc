@@ -39,7 +39,7 @@ struct RunArguments {
   std::string folder;
   std::optional<std::uint64_t> seed;
   bool force = false, quiet = false, no_figures = false, covariances = false, all = false;
-  bool follow = false, view = false;
+  bool follow = false, view = false, strict = false;
   std::string video;
 };
 
@@ -92,7 +92,7 @@ std::string EventSummary(const RunResult& result) {
 
 std::string Summary(const RunResult& result, const std::string& table, const Recorder& recorder,
                     const std::string& video) {
-  std::string text = table;
+  std::string text = VerdictText(result) + '\n' + table;
   if (const std::string events = EventSummary(result); !events.empty()) text += '\n' + events;
   text += "\nwrote " + recorder.folder().string() + '\n';
   for (const std::string& path : recorder.highlights()) {
@@ -135,6 +135,11 @@ Recorder::Options RecordOf(const RunArguments& arguments, const Config& config,
   return record;
 }
 
+/// Returns whether no verdict is worse than `not tested`.
+bool IsAcceptable(const RunResult& result) {
+  return WorstVerdict(result).value_or(VerdictState::kConsistent) >= VerdictState::kNotTested;
+}
+
 ExitCode RunConfig(const RunArguments& arguments) {
   Config config = arguments.input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
@@ -156,8 +161,9 @@ ExitCode RunConfig(const RunArguments& arguments) {
   options.stop = StopRequested;
   const RunResult result = Run(experiment, options);
   progress.Clear();
-  if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
-  if (result.status == RunStatus::kStopped) PrintNote(result.reason);
+  // Without a frame there is nothing to record, and the recorder removes the run folder.
+  if (result.frames == 0 && result.status == RunStatus::kFailed)
+    throw Error(result.code, result.reason);
   recorder.Finish(result);
   if (viewer) viewer->Close();
   if (!arguments.quiet && !arguments.follow) {
@@ -166,7 +172,11 @@ ExitCode RunConfig(const RunArguments& arguments) {
                                   : internal::MainTable(result, internal::SubjectsOf(experiment));
     Print(Summary(result, table, recorder, arguments.video));
   }
-  return result.code;
+  if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
+  if (result.status == RunStatus::kStopped) PrintNote(result.reason);
+  return arguments.strict && result.code == ExitCode::kOk && !IsAcceptable(result)
+             ? ExitCode::kFound
+             : result.code;
 }
 
 }  // namespace
@@ -182,6 +192,8 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   command.add_flag("--force", arguments->force, "replace the run folder if it exists");
   command.add_flag("--all", arguments->all, "print all rows of the table, not only ten");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
+  command.add_flag("--strict", arguments->strict,
+                   "exit with code 1 if a verdict is neither `consistent` nor `not tested`");
   command.add_flag("--follow", arguments->follow,
                    "print each estimate at once as a line of JSON; do not print the table");
   command

@@ -22,18 +22,20 @@ constexpr const char* kSweepFooter = R"(Examples:
   alidade sweep config.yaml --runs 200 --first-seed 1001 -o runs/test
   alidade sweep config.yaml --runs 10000 --shard 3/16 -o runs/shard-03
   alidade sweep config.yaml --runs 200 --vary sensors.stereo.sigma_px=0.5,1,2
+  alidade sweep config.yaml --runs 200 --vary-filter state.robot.noise.acceleration=0.1,1
   alidade sweep config.yaml --runs 200 -o runs/test --resume
 
-The folder contains sweep.json, runs.csv and table.md. With --vary, it also contains sweep.csv and a
-figure. The number of jobs does not change the contents. Exit code 1: some runs failed; 75: a signal
-stopped the sweep. Until all runs are finished, the folder is called FOLDER.partial. A sweep that
-was stopped or killed leaves this folder, and --resume adds the missing runs. `alidade merge` merges
-the folders of shards.)";
+The folder contains sweep.json, runs.csv and table.md. With --vary or --vary-filter, it also
+contains sweep.csv and a figure. The number of jobs does not change the contents. Exit code 1: some
+runs failed; 75: a signal stopped the sweep. Until all runs are finished, the folder is called
+FOLDER.partial. A sweep that was stopped or killed leaves this folder, and --resume adds the missing
+runs. `alidade merge` merges the folders of shards.)";
 
 struct SweepArguments {
   Input input;
   std::string folder;
-  std::string vary;
+  std::string vary;  ///< "": no key is varied
+  Variation::Scope scope = Variation::Scope::kConfig;
   SweepOptions options;
   bool force = false, quiet = false, resume = false;
 };
@@ -91,11 +93,11 @@ ExitCode SweepSeeds(const Task& task, SweepOptions options) {
   const std::unique_ptr<SweepFolder> folder = OpenFolder(task, options);
   const SweepResult result = Sweep(task.config, task.host, options);
   task.progress.Clear();
-  return FinishSweep(*folder, task.path, result, task.config, task.arguments.quiet);
+  return FinishSweep(*folder, task.path, result, task.config, task.inputs, task.arguments.quiet);
 }
 
 ExitCode SweepValues(const Task& task, SweepOptions options) {
-  const Variation variation = Variation::FromText(task.arguments.vary);
+  const Variation variation = Variation::FromText(task.arguments.vary, task.arguments.scope);
   const std::unique_ptr<SweepFolder> folder = OpenFolder(task, options);
   const VariedSweep sweep = SweepVariation(task.config, task.host, options, variation);
   task.progress.Clear();
@@ -121,7 +123,7 @@ bool IsFinished(const std::filesystem::path& folder, const Config& config,
 /// set, because the sweep reports these values.
 std::vector<Config> ConfigsOf(const SweepArguments& arguments, const Config& config) {
   if (arguments.vary.empty()) return {config};
-  const Variation variation = Variation::FromText(arguments.vary);
+  const Variation variation = Variation::FromText(arguments.vary, arguments.scope);
   std::vector<Config> configs;
   for (const std::string& value : variation.values) {
     try {
@@ -143,7 +145,9 @@ std::vector<std::string> ArgumentsOf(const SweepArguments& arguments) {
     list.insert(list.end(),
                 {"--shard", std::to_string(shard->index) + '/' + std::to_string(shard->count)});
   }
-  if (!arguments.vary.empty()) list.insert(list.end(), {"--vary", arguments.vary});
+  if (!arguments.vary.empty()) {
+    list.insert(list.end(), {Variation::OptionOf(arguments.scope), arguments.vary});
+  }
   return list;
 }
 
@@ -175,6 +179,18 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   return arguments.vary.empty() ? SweepSeeds(task, options) : SweepValues(task, options);
 }
 
+/// Adds the option that varies keys of the given scope.
+CLI::Option* AddVariation(CLI::App& command, SweepArguments& arguments, Variation::Scope scope,
+                          const char* help) {
+  const auto read = [&arguments, scope](const std::string& text) {
+    arguments.vary = text;
+    arguments.scope = scope;
+  };
+  return command.add_option_function<std::string>(Variation::OptionOf(scope), read, help)
+      ->option_text("KEY=v1,v2,...")
+      ->check(IsNonEmpty);
+}
+
 }  // namespace
 
 void AddSweep(CLI::App& program, Action& action) {
@@ -202,11 +218,12 @@ void AddSweep(CLI::App& program, Action& action) {
       .add_option_function<std::string>("--shard", read_shard,
                                         "run only the seeds of shard i of n equal shards")
       ->option_text("i/n");
-  command
-      .add_option("--vary", arguments->vary,
-                  "run all seeds with each value of a key, or of several keys KEY+KEY")
-      ->option_text("KEY=v1,v2,...")
-      ->check(IsNonEmpty);
+  AddVariation(command, *arguments, Variation::Scope::kConfig,
+               "run all seeds with each value of a key, or of several keys KEY+KEY");
+  AddVariation(command, *arguments, Variation::Scope::kEstimators,
+               "like --vary, but only the estimators have the values: truth and the data of the "
+               "source keep the value of the config")
+      ->excludes(command.get_option("--vary"));
   AddOutput(command, arguments->folder,
             "output folder; default: the config's `output:`, or sweep-NAME, in runs/");
   command.add_flag("--force", arguments->force, "replace the folder if it exists");

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sweep_report.h"
 
+#include <algorithm>
+#include <cctype>
+
 #include "alidade/io/output_folder.h"
+#include "alidade/replay/run_inputs.h"
+#include "alidade/sweep/worst_seeds.h"
 #include "command.h"
 #include "console.h"
 
@@ -25,6 +30,33 @@ bool ReportFailures(const SweepResult& result, const std::string& prefix) {
   return failed > 0;
 }
 
+/// Returns the text as one word of a shell command.
+std::string ShellWord(const std::string& text) {
+  const auto is_plain = [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '/' || c == '.' || c == '_' || c == '-';
+  };
+  if (std::ranges::all_of(text, is_plain)) return text;
+  std::string word = "'";
+  for (const char c : text) c == '\'' ? word += "'\\''" : word += c;
+  return word + '\'';
+}
+
+/// Returns the lines of the worst seeds, and the command that repeats the run of the worst. Returns
+/// "" if no seeds are listed. `inputs` is the text of inputs.json.
+std::string WorstSeedText(const SweepResult& result, const std::filesystem::path& folder,
+                          const std::string& inputs) {
+  const std::vector<internal::WorstSeeds> worst = internal::FindWorstSeeds(result);
+  if (worst.empty()) return "";
+  std::string command = "alidade run " + ShellWord((folder / internal::kResolvedConfig).string()) +
+                        " --seed " + std::to_string(worst.front().seeds.front());
+  const internal::RecordedInputs recorded =
+      internal::ReadInputs(inputs, (folder / internal::kInputsFile).string());
+  for (const std::filesystem::path& path : recorded.command.plugin_paths) {
+    command += " --plugin-path " + ShellWord(path.string());
+  }
+  return internal::WorstSeedLines(worst) + "repeat the run of a seed: " + command + '\n';
+}
+
 /// Prints the table of a sweep and the names of its main files.
 void PrintWritten(const std::filesystem::path& path, const std::string& table,
                   const std::vector<std::string>& names) {
@@ -41,13 +73,15 @@ ExitCode CodeOf(bool stopped, bool failed) {
 }  // namespace
 
 ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
-                     const SweepResult& result, const Config& config, bool quiet) {
+                     const SweepResult& result, const Config& config, const std::string& inputs,
+                     bool quiet) {
   const bool failed = ReportFailures(result, "");
   if (result.stopped) ReportStopped(result.done.size(), result.runs, kResume);
   const std::vector<SweepSummary> summaries = Summarise(result);
   folder.Write(result, summaries, config);
   if (!quiet) {
-    PrintWritten(result.stopped ? internal::PartialOf(path) : path, SweepTable(result, summaries),
+    const std::filesystem::path written = result.stopped ? internal::PartialOf(path) : path;
+    PrintWritten(written, SweepTable(result, summaries) + WorstSeedText(result, written, inputs),
                  {"table.md", "sweep.json", "runs.csv"});
   }
   return CodeOf(result.stopped, failed);

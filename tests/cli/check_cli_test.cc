@@ -89,7 +89,7 @@ TEST_F(CheckProgram, TakesParametersFromTheConfigOfARun) {
   const Outcome none = Call({"check", "scale_2d", "--config", "table.yaml"});
   EXPECT_EQ(none.code, 78);
   EXPECT_TRUE(Contains(none.err, "error: table.yaml")) << none.err;
-  EXPECT_TRUE(Contains(none.err, "has a model of the plugin; expected an entry with model: "))
+  EXPECT_TRUE(Contains(none.err, "uses a model of the plugin; expected an entry with model: "))
       << none.err;
   EXPECT_EQ(Call(With(kStereo, {"--config", "config.yaml"})).code, 2);
 }

@@ -26,6 +26,16 @@ TEST_F(Cli, HelpNamesEveryCommandAndExitsWithZero) {
   }
 }
 
+// Words for commands that other programs use.
+TEST_F(Cli, HelpVersionAndListAreCommands) {
+  EXPECT_EQ(Call({"help"}).out, Call({"--help"}).out);
+  EXPECT_EQ(Call({"help", "run"}).out, Call({"run", "--help"}).out);
+  EXPECT_EQ(Call({"help", "run"}).code, 0);
+  EXPECT_EQ(Call({"version"}).out, Call({"--version"}).out);
+  EXPECT_EQ(Call({"list"}).out, Call({"plugins", "list"}).out);
+  EXPECT_FALSE(Call({"list"}).out.empty());
+}
+
 TEST_F(Cli, UsageErrorsExitWithTwoAndNameHelp) {
   const Outcome mistyped = Call({"rnu"});
   EXPECT_EQ(mistyped.code, 2);
@@ -37,7 +47,11 @@ TEST_F(Cli, UsageErrorsExitWithTwoAndNameHelp) {
   EXPECT_EQ(Call({"run", "config.yaml", "--forec"}).err,
             "error: unknown option '--forec'; did you mean '--force'?\nsee `alidade run --help`\n");
   EXPECT_EQ(Call({"plugins", "info"}).err,
-            "error: NAME is required\nsee `alidade plugins info --help`\n");
+            "error: the argument NAME is missing (name of a sensor, motion model, source or "
+            "estimator)\nsee `alidade plugins info --help`\n");
+  EXPECT_EQ(Call({"sweep", "config.yaml", "--runs"}).err,
+            "error: the option --runs needs a value (total number of runs, over all shards)\nsee "
+            "`alidade sweep --help`\n");
   for (const Arguments& bad : {Arguments{},
                                {"run"},
                                {"run", "a", "b"},
@@ -153,7 +167,7 @@ TEST_F(Cli, ConfigErrorsHavePlaceAndRemedy) {
   EXPECT_TRUE(Contains(model.err, "did you mean stereo_disparity?") ||
               Contains(model.err, "did you mean 'stereo_disparity'?"))
       << model.err;
-  EXPECT_TRUE(Contains(model.err, "\n  searched ")) << model.err;
+  EXPECT_FALSE(Contains(model.err, "\n  searched ")) << model.err;
 }
 
 TEST_F(Cli, UntrustedPluginIsRefusedWithSeventySeven) {
@@ -373,7 +387,7 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
     EXPECT_TRUE(Contains(estimator.out, type + ": estimator")) << estimator.out;
     EXPECT_TRUE(Contains(estimator.out, "max_dt_s")) << estimator.out;
     EXPECT_EQ(Contains(estimator.out, "kappa"), type == "ukf") << estimator.out;
-    EXPECT_FALSE(Contains(estimator.out, "rejection_recovery")) << estimator.out;
+    EXPECT_TRUE(Contains(estimator.out, "rejection_recovery.after_s")) << estimator.out;
   }
 
   const Outcome missing = Call({"plugins", "info", "stereo_disparit"});

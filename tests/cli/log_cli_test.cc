@@ -47,6 +47,13 @@ TEST_F(LogCli, OptionQuietAndEnvironmentSetTheLevel) {
   has({}, false, false);
 }
 
+TEST_F(LogCli, TheLevelMayPrecedeTheCommand) {
+  const Outcome run = Call({"--log-level", "debug", "doctor"});
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_EQ(run.err, Call({"doctor", "--log-level", "debug"}).err);
+  EXPECT_NE(run.err, Call({"doctor"}).err);
+}
+
 TEST_F(LogCli, AnUnknownLevelIsAUsageError) {
   const std::string what =
       "'loud' is not a log level; expected one of trace, debug, info, warning, error, off";

@@ -66,7 +66,7 @@ TEST_F(SweepCli, SummarisesRunsThatRunWouldGive) {
   EXPECT_EQ(summary.root().At("runs_used").Number(), 1);
   EXPECT_EQ(summary.root().At("first_seed").Number(), 7);
   const Node ekf = summary.root().At("estimators").At("ekf");
-  EXPECT_EQ(ekf.At("diverged").Number(), 0);
+  EXPECT_EQ(ekf.At("verdicts").At("diverged").Number(), 0);
   const Node metrics = record.root().At("estimators").At("ekf").At("metrics");
   const double rmse = metrics.At("rmse:target.depth").Number();
   for (const char* key : {"mean", "p05", "p50", "p95"}) {
@@ -150,9 +150,9 @@ TEST_F(SweepCli, CountsDivergedRunsAndLeavesTheirMetricsOut) {
   EXPECT_EQ(sweep.code, 0) << sweep.err;
   const Config summary = Json("out/sweep.json");
   const Node ekf = summary.root().At("estimators").At("ekf");
-  EXPECT_EQ(ekf.At("diverged").Number(), 3);
+  EXPECT_EQ(ekf.At("verdicts").At("diverged").Number(), 3);
   EXPECT_TRUE(ekf.At("metrics").Entries().empty());
-  EXPECT_TRUE(Contains(Read("out/runs.csv"), "\n2,ekf,true,"));
+  EXPECT_TRUE(Contains(Read("out/runs.csv"), "\n2,ekf,diverged,"));
 }
 
 // The sigma of the filter is a hundredth of the true noise.
@@ -169,13 +169,13 @@ TEST_F(SweepCli, InconsistentRunsCountAndAreTold) {
   ASSERT_EQ(Call(arguments).code, 0);
   const Config summary = Json("out/sweep.json"), record = Json("run/run.json");
   const Node ekf = summary.root().At("estimators").At("ekf");
-  EXPECT_EQ(ekf.At("diverged").Number(), 0);
-  EXPECT_EQ(ekf.At("inconsistent").Number(), 1);
+  EXPECT_EQ(ekf.At("verdicts").At("diverged").Number(), 0);
+  EXPECT_EQ(ekf.At("verdicts").At("lost").Number(), 1);
   const Node metrics = record.root().At("estimators").At("ekf").At("metrics");
   for (const char* key : {"rmse:target.depth", "nees.mean:target"}) {
     EXPECT_EQ(ekf.At("metrics").At(key).At("mean").Number(), metrics.At(key).Number()) << key;
   }
-  EXPECT_TRUE(Contains(Read("out/runs.csv"), "\n7,ekf,false,true,"));
+  EXPECT_TRUE(Contains(Read("out/runs.csv"), "\n7,ekf,lost,"));
   EXPECT_TRUE(Contains(Read("out/table.md"), "| runs used | 1 |")) << Read("out/table.md");
 }
 
@@ -205,7 +205,7 @@ TEST_F(SweepCli, EachValueOfAKeyIsSweptAsIfItWereSet) {
       Call({"sweep", "config.yaml", "--runs", "3", "--first-seed", "5", "-o", "varied", "--vary",
             "sensors.stereo.sigma_px=0.5,2", "--set", no_gate});
   ASSERT_EQ(varied.code, 0) << varied.err;
-  EXPECT_TRUE(Contains(varied.out, "ekf, by sensors.stereo.sigma_px\n")) << varied.out;
+  EXPECT_TRUE(Contains(varied.out, "ekf, means by sensors.stereo.sigma_px\n")) << varied.out;
   EXPECT_TRUE(Contains(varied.out, "\n0.5    0 of 3  ")) << varied.out;
   const Config summary = Json("varied/sweep.json");
   EXPECT_EQ(summary.root().At("vary").Text(), "sensors.stereo.sigma_px");
@@ -232,7 +232,7 @@ TEST_F(SweepCli, EachValueOfAKeyIsSweptAsIfItWereSet) {
   EXPECT_EQ(Rows(Read("varied/runs.csv")), rows);
   const std::string table = Read("varied/sweep.csv");
   EXPECT_TRUE(
-      table.starts_with("sensors.stereo.sigma_px,ekf.used,ekf.diverged,ekf.inconsistent,"
+      table.starts_with("sensors.stereo.sigma_px,ekf.used,ekf.diverged,ekf.lost,"
                         "ekf.mean:rmse:"));
   EXPECT_TRUE(Contains(table, "\n0.5,3,0,0,")) << table;
   EXPECT_TRUE(Contains(table, "\n2,3,0,0,")) << table;

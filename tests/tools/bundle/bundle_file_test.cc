@@ -161,6 +161,11 @@ TEST_F(BundleFiles, ReadsLibmvOfEitherByteOrder) {
   }
 }
 
+TEST_F(BundleFiles, ATextOfAnotherFormatNamesTheFormats) {
+  for (const char* text : {"alidade: 1\n", "# a comment\n1 1 1\n"})
+    ExpectBad(text, {":1:1: the format of the file is unknown", "(BAL)", "(Bundler)", "(libmv)"});
+}
+
 TEST_F(BundleFiles, RefusesBadBal) {
   ExpectBad("", {":1:1: the file is empty"});
   ExpectBad("1 1 1\n0 1 2 3\n", {":2:3: '1' is out of range; expected the point", "from 0 to 0"});

@@ -8,6 +8,7 @@
 
 #include "alidade/estimation/event.h"
 #include "alidade/experiment/metric_table.h"
+#include "alidade/experiment/verdict.h"
 #include "alidade/record/column_tables.h"
 
 /// The lists of metrics, events, outcomes and columns in the documentation are generated from
@@ -64,6 +65,18 @@ std::string EventList() {
   return list;
 }
 
+std::string FindingList() {
+  std::string list = Row({"code", "meaning"}) + "|---|---|\n";
+  for (const FindingKindInfo& kind : kFindingKinds) list += Row({Quoted(kind.name), kind.meaning});
+  return list;
+}
+
+std::string VerdictList() {
+  std::string list = Row({"verdict", "meaning"}) + "|---|---|\n";
+  for (const VerdictInfo& verdict : kVerdicts) list += Row({Quoted(verdict.name), verdict.meaning});
+  return list;
+}
+
 std::string OutcomeList() {
   std::string list = Row({"outcome", "meaning", "counts as rejection"}) + "|---|---|---|\n";
   for (const OutcomeInfo& outcome : kOutcomes) {
@@ -103,7 +116,7 @@ void ExpectList(const std::string& page, const std::string& name, const std::str
   const std::string file = std::string(ALIDADE_SOURCE_DIR) + "/docs/" + page;
   const std::string begin = "<!-- list: " + name + " -->\n\n", end = "\n<!-- end of list -->";
   std::string text = Read(file);
-  const std::size_t first = text.find(begin), last = text.find(end, first);
+  const std::size_t first = text.find(begin), last = text.find(end, first + begin.size() - 1);
   ASSERT_TRUE(first != text.npos && last != text.npos) << page << " has no list " << name;
   const std::size_t start = first + begin.size();
   if (std::getenv("ALIDADE_UPDATE_DOCS") != nullptr) {
@@ -116,6 +129,8 @@ void ExpectList(const std::string& page, const std::string& name, const std::str
 
 TEST(GeneratedLists, AreInTheDocumentation) {
   ExpectList("metrics.md", "metrics", MetricList());
+  ExpectList("metrics.md", "verdicts", VerdictList());
+  ExpectList("diagnose.md", "findings", FindingList());
   const std::string page = "run_folder.md";
   ExpectList(page, "events", EventList());
   ExpectList(page, "outcomes", OutcomeList());

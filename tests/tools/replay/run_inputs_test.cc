@@ -128,7 +128,7 @@ TEST(RunInputs, WhatIsNoRecordIsRefused) {
       ADD_FAILURE() << text;
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ExitCode::kBadData);
-      EXPECT_TRUE(std::string(error.what()).starts_with("out/inputs.json: is not ")) << text;
+      EXPECT_TRUE(std::string(error.what()).starts_with("out/inputs.json: this is not ")) << text;
     }
   }
 }

@@ -27,6 +27,7 @@ SweepRun MakeRun(std::uint64_t seed) {
   EstimatorResult one;
   one.name = "a";
   one.diverged = one.failed = true;
+  one.verdict.state = VerdictState::kDiverged;
   one.units = {{"depth", "m"}};
   one.counts = {{"accepted:stereo", 75}};
   one.metrics = {{"third", 1.0 / 3.0},
@@ -67,7 +68,7 @@ TEST(FinishedRuns, AreReadAsTheyWereWritten) {
   ASSERT_EQ(known->estimators.size(), 1u);
   const SweepRow &one = known->estimators[0], &was = expected.estimators[0];
   EXPECT_EQ(one.name, was.name);
-  EXPECT_TRUE(one.diverged && one.failed && !one.inconsistent);
+  EXPECT_TRUE(one.diverged && one.failed && one.verdict == VerdictState::kDiverged);
   EXPECT_EQ(one.units.names(), was.units.names());
   EXPECT_EQ(one.units.values(), was.units.values());
   EXPECT_EQ(one.counts.names(), was.counts.names());

@@ -23,6 +23,12 @@ bool IsLibmv(std::string_view bytes) {
          (bytes[1] == 'P' || bytes[1] == 'N');
 }
 
+/// Returns true if the first word of the file is a number, as in the format BAL.
+bool StartsWithCount(std::string_view text) {
+  const char first = text[text.find_first_not_of(" \t\r\n")];
+  return (first >= '0' && first <= '9') || first == '-' || first == '+';
+}
+
 /// Throws kBadData if the file is compressed or binary.
 void RejectBinary(const std::string& name, std::string_view beginning) {
   constexpr std::string_view kCompressed[] = {"\x1F\x8B", "BZh",
@@ -85,6 +91,14 @@ BundleFile ReadBundle(const std::filesystem::path& file) {
     FailFormat(name,
                "the columns are separated by commas: tracks need a calibration and initial poses",
                "the options --camera FILE and --start FILE");
+  }
+  if (!StartsWithCount(view)) {
+    FailFormat(
+        name, "the format of the file is unknown",
+        std::string("a file that begins with the numbers of cameras, points and observations "
+                    "(BAL), with '") +
+            std::string(internal::kBundlerHeader) +
+            "' (Bundler), or with vP or VP (libmv), or tracks with --camera and --start");
   }
   return internal::ReadBal(view, name);
 }

@@ -21,20 +21,22 @@ using internal::ChildEnd;
 using internal::Context;
 using internal::NumberText;
 
-/// First character of the child's answer: kError for a set-up error, otherwise one of kVerdicts.
+/// First character of the child's answer: kError for a set-up error, otherwise one of
+/// kVerdictNames.
 constexpr char kError = 'E';
-constexpr char kVerdicts[] = {'+', '-', '0'};
+constexpr char kVerdictNames[] = {'+', '-', '0'};
 
-std::string Encode(const Finding& finding) {
-  return kVerdicts[static_cast<int>(finding.verdict)] + finding.text;
+std::string Encode(const CheckResult& finding) {
+  return kVerdictNames[static_cast<int>(finding.verdict)] + finding.text;
 }
 
-Finding Decode(const std::string& answer) {
+CheckResult Decode(const std::string& answer) {
   if (answer.empty()) return internal::Fail("the check returned no verdict");
   if (answer.front() == kError) throw Error(ExitCode::kBadConfig, answer.substr(1));
-  const auto* verdict = std::find(std::begin(kVerdicts), std::end(kVerdicts), answer.front());
-  if (verdict == std::end(kVerdicts)) return internal::Fail("the check returned no verdict");
-  return {static_cast<Finding::Verdict>(verdict - kVerdicts), "", answer.substr(1)};
+  const auto* verdict =
+      std::find(std::begin(kVerdictNames), std::end(kVerdictNames), answer.front());
+  if (verdict == std::end(kVerdictNames)) return internal::Fail("the check returned no verdict");
+  return {static_cast<CheckResult::Verdict>(verdict - kVerdictNames), "", answer.substr(1)};
 }
 
 /// Describes how the child ended, and names the call in which it ended.
@@ -53,13 +55,13 @@ std::string EndText(const ChildEnd& end, const internal::CallRecord& record, dou
 }
 
 /// Runs one check in a child process. Sets `ended` if the child ended without an answer.
-Finding RunCheck(const Check& check, const PluginEntry& entry, const Node& parameters,
-                 const CheckOptions& options, bool& ended) {
+CheckResult RunCheck(const Check& check, const PluginEntry& entry, const Node& parameters,
+                     const CheckOptions& options, bool& ended) {
   internal::CallRecord record;
   const auto work = [&]() -> std::string {
     try {
       Context context(entry, parameters, options, record);
-      const Finding finding = check.run(context);
+      const CheckResult finding = check.run(context);
       context.Close();
       return Encode(finding);
     } catch (const Error& e) {
@@ -71,9 +73,9 @@ Finding RunCheck(const Check& check, const PluginEntry& entry, const Node& param
   };
   const ChildEnd end = internal::RunInChild({options.timeout_s, options.memory_mb}, work);
   ended = !end.answered;
-  Finding finding =
+  CheckResult finding =
       end.answered ? Decode(end.text) : internal::Fail(EndText(end, record, options.timeout_s));
-  if (finding.verdict == Finding::Verdict::kOk && check.run == internal::CheckEnvironment &&
+  if (finding.verdict == CheckResult::Verdict::kOk && check.run == internal::CheckEnvironment &&
       !end.printed.empty()) {
     finding = internal::Fail("the model prints text, which would mix with the output of a run: '" +
                              end.printed + "'");
@@ -90,17 +92,17 @@ Finding RunCheck(const Check& check, const PluginEntry& entry, const Node& param
 
 }  // namespace
 
-std::vector<Finding> CheckModel(const PluginEntry& entry, const Node& parameters,
-                                const CheckOptions& options) {
+std::vector<CheckResult> CheckModel(const PluginEntry& entry, const Node& parameters,
+                                    const CheckOptions& options) {
   ALIDADE_EXPECTS(entry.is_model() && options.states > 0 && options.timeout_s > 0.0);
-  std::vector<Finding> findings;
+  std::vector<CheckResult> findings;
   std::string stopped_by;
   for (const Check& check : internal::kChecks) {
-    Finding finding = internal::Skip("'" + stopped_by + "' failed");
+    CheckResult finding = internal::Skip("'" + stopped_by + "' failed");
     if (stopped_by.empty()) {
       bool ended = false;
       finding = RunCheck(check, entry, parameters, options, ended);
-      const bool failed = finding.verdict == Finding::Verdict::kFail;
+      const bool failed = finding.verdict == CheckResult::Verdict::kFail;
       if (failed && (check.needed || ended)) stopped_by = check.name;
     }
     finding.check = check.name;
@@ -156,10 +158,10 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
   return found;
 }
 
-std::string CheckText(const PluginEntry& entry, const std::vector<Finding>& findings) {
+std::string CheckText(const PluginEntry& entry, const std::vector<CheckResult>& findings) {
   constexpr const char* kWords[] = {"ok", "FAIL", "skipped"};
   std::vector<internal::TextRow> rows;
-  for (const Finding& finding : findings) {
+  for (const CheckResult& finding : findings) {
     std::string text = finding.text;
     std::replace(text.begin(), text.end(), '\n', ' ');
     rows.push_back({kWords[static_cast<int>(finding.verdict)], finding.check, text});
@@ -168,9 +170,9 @@ std::string CheckText(const PluginEntry& entry, const std::vector<Finding>& find
          internal::TextTable(rows, 2);
 }
 
-bool AnyFailure(const std::vector<Finding>& findings) {
-  return std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
-    return finding.verdict == Finding::Verdict::kFail;
+bool AnyFailure(const std::vector<CheckResult>& findings) {
+  return std::any_of(findings.begin(), findings.end(), [](const CheckResult& finding) {
+    return finding.verdict == CheckResult::Verdict::kFail;
   });
 }
 

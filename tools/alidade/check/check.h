@@ -27,7 +27,7 @@ struct CheckOptions {
 };
 
 /// Result of one check.
-struct Finding {
+struct CheckResult {
   enum class Verdict { kOk, kFail, kSkipped };
   Verdict verdict = Verdict::kSkipped;
   std::string check;  ///< name of the check, as in `jacobian`
@@ -38,8 +38,8 @@ struct Finding {
 /// the limits of `options`. The later checks are skipped if a check that they need fails, or if a
 /// child process ends without an answer. docs/check.md lists the checks. Error: kBadConfig if the
 /// parameters are invalid.
-std::vector<Finding> CheckModel(const PluginEntry& entry, const Node& parameters,
-                                const CheckOptions& options = {});
+std::vector<CheckResult> CheckModel(const PluginEntry& entry, const Node& parameters,
+                                    const CheckOptions& options = {});
 
 /// Finds sensors and motion models. `plugin` is the path of a plugin file, the name of a file on
 /// the search path, or the name of a model. The name of a file excludes `.so` and may exclude
@@ -49,9 +49,9 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
                                     const std::string& model = "");
 
 /// Formats the findings as lines `verdict  check  text`, below a line with the name of the model.
-std::string CheckText(const PluginEntry& entry, const std::vector<Finding>& findings);
+std::string CheckText(const PluginEntry& entry, const std::vector<CheckResult>& findings);
 
 /// Returns true if one of the findings is a failure.
-bool AnyFailure(const std::vector<Finding>& findings);
+bool AnyFailure(const std::vector<CheckResult>& findings);
 
 }  // namespace alidade

@@ -67,34 +67,38 @@ class Context {
   std::vector<CheckedState> states_;
 };
 
-inline Finding Ok(std::string text) { return {Finding::Verdict::kOk, "", std::move(text)}; }
-inline Finding Fail(std::string text) { return {Finding::Verdict::kFail, "", std::move(text)}; }
-inline Finding Skip(std::string text) { return {Finding::Verdict::kSkipped, "", std::move(text)}; }
+inline CheckResult Ok(std::string text) { return {CheckResult::Verdict::kOk, "", std::move(text)}; }
+inline CheckResult Fail(std::string text) {
+  return {CheckResult::Verdict::kFail, "", std::move(text)};
+}
+inline CheckResult Skip(std::string text) {
+  return {CheckResult::Verdict::kSkipped, "", std::move(text)};
+}
 
 struct Check {
   const char* name;
-  Finding (*run)(Context&);
+  CheckResult (*run)(Context&);
   bool needed;  ///< true: if this check fails, all later checks are skipped
 };
 
 // Checks of the rules of the plugin ABI.
-Finding CheckCreate(Context& context);
-Finding CheckCalls(Context& context);
-Finding CheckBounds(Context& context);
-Finding CheckEnvironment(Context& context);
-Finding CheckDeterministic(Context& context);
-Finding CheckPure(Context& context);
-Finding CheckOutputs(Context& context);
-Finding CheckFailure(Context& context);
-Finding CheckLeaks(Context& context);
+CheckResult CheckCreate(Context& context);
+CheckResult CheckCalls(Context& context);
+CheckResult CheckBounds(Context& context);
+CheckResult CheckEnvironment(Context& context);
+CheckResult CheckDeterministic(Context& context);
+CheckResult CheckPure(Context& context);
+CheckResult CheckOutputs(Context& context);
+CheckResult CheckFailure(Context& context);
+CheckResult CheckLeaks(Context& context);
 // Checks of the mathematics.
-Finding CheckSameValue(Context& context);
-Finding CheckJacobian(Context& context);
-Finding CheckNoise(Context& context);
-Finding CheckDoubleCover(Context& context);
-Finding CheckInitialise(Context& context);
-Finding CheckStep(Context& context);
-Finding CheckNoiseKind(Context& context);
+CheckResult CheckSameValue(Context& context);
+CheckResult CheckJacobian(Context& context);
+CheckResult CheckNoise(Context& context);
+CheckResult CheckDoubleCover(Context& context);
+CheckResult CheckInitialise(Context& context);
+CheckResult CheckStep(Context& context);
+CheckResult CheckNoiseKind(Context& context);
 
 inline constexpr Check kChecks[] = {
     {"create", CheckCreate, true},

@@ -166,7 +166,7 @@ std::string KindsText(const ModelUnderTest& model) {
 
 }  // namespace
 
-Finding CheckSameValue(Context& context) {
+CheckResult CheckSameValue(Context& context) {
   for (const Function& f : context.model().functions) {
     for (const CheckedState& state : context.states()) {
       if (f.differentiated == 0) continue;
@@ -186,7 +186,7 @@ Finding CheckSameValue(Context& context) {
   return Ok("values are the same with and without Jacobians");
 }
 
-Finding CheckJacobian(Context& context) {
+CheckResult CheckJacobian(Context& context) {
   JacobianTally tally;
   for (const Function& f : context.model().functions) {
     for (const CheckedState& state : context.states()) {

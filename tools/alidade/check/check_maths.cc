@@ -191,7 +191,7 @@ void CompareCovers(Context& context, const Function& f, std::size_t i, int offse
 
 }  // namespace
 
-Finding CheckNoise(Context& context) {
+CheckResult CheckNoise(Context& context) {
   const Function* const f =
       context.model().Find(context.model().is_sensor() ? "SqrtNoise" : "SqrtQ");
   if (f == nullptr) return Skip("the model has no noise input");
@@ -214,7 +214,7 @@ Finding CheckNoise(Context& context) {
   return Ok(context.model().is_sensor() ? "R is finite and positive definite" : "Lq is finite");
 }
 
-Finding CheckDoubleCover(Context& context) {
+CheckResult CheckDoubleCover(Context& context) {
   WorstDeviation worst;
   bool has_quaternion = false;
   for (const Function& f : context.model().functions) {
@@ -231,7 +231,7 @@ Finding CheckDoubleCover(Context& context) {
   return worst.failure.empty() ? Ok("q and -q yield the same results") : Fail(worst.failure);
 }
 
-Finding CheckInitialise(Context& context) {
+CheckResult CheckInitialise(Context& context) {
   const Function* const f = context.model().Find("Initialise");
   if (f == nullptr) return Skip("the model has no Initialise");
   const std::vector<int> y = context.model().InitialisedRoles();
@@ -269,7 +269,7 @@ Finding CheckInitialise(Context& context) {
   return Ok("Predict reproduces the measurement at " + std::to_string(inverted) + " states");
 }
 
-Finding CheckStep(Context& context) {
+CheckResult CheckStep(Context& context) {
   if (context.model().is_sensor()) return Skip("the model is not a motion model");
   const Function& f = context.main();
   const std::vector<std::string> names = TangentNames(f.outputs);
@@ -317,7 +317,7 @@ Finding CheckStep(Context& context) {
 
 // If the declared kind is wrong, the defect is at least 0.47 for every dt. If the declared kind is
 // correct, the defect vanishes for dt -> 0.
-Finding CheckNoiseKind(Context& context) {
+CheckResult CheckNoiseKind(Context& context) {
   constexpr double kMaxDefect = 0.1;
   if (context.model().is_sensor()) return Skip("the model is not a motion model");
   if (context.model().Find("SqrtQ") == nullptr) return Skip("the model has no noise input");

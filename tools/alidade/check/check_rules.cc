@@ -32,7 +32,7 @@ std::string FirstFailure(Context& context, const Test& test) {
   return {};
 }
 
-Finding ToFinding(const std::string& failure, const std::string& success_text) {
+CheckResult ToFinding(const std::string& failure, const std::string& success_text) {
   return failure.empty() ? Ok(success_text) : Fail(failure);
 }
 
@@ -134,13 +134,13 @@ std::string JacobianDefect(const Function& f, const CheckedState& state, const A
 
 }  // namespace
 
-Finding CheckCreate(Context& context) {
+CheckResult CheckCreate(Context& context) {
   if (!context.options().allows_unread_keys) context.RejectUnread();
   for (int i = 0; i < 3; ++i) context.Destroy(context.Create());
   return Ok("created and destroyed");
 }
 
-Finding CheckCalls(Context& context) {
+CheckResult CheckCalls(Context& context) {
   int defined = 0;
   for (const CheckedState& state : context.states()) defined += state.defined ? 1 : 0;
   const std::string failure =
@@ -156,7 +156,7 @@ Finding CheckCalls(Context& context) {
   return Ok(text);
 }
 
-Finding CheckBounds(Context& context) {
+CheckResult CheckBounds(Context& context) {
   const std::string failure = FirstFailure(context, [&](const Function& f,
                                                         const CheckedState& state) {
     const Answer answer = context.Call(f, state);
@@ -179,7 +179,7 @@ Finding CheckBounds(Context& context) {
   return ToFinding(failure, "each function writes only to its outputs");
 }
 
-Finding CheckEnvironment(Context& context) {
+CheckResult CheckEnvironment(Context& context) {
   const NumberSettings previous;
   const auto changed = [&](const std::string& call) {
     const std::string change = ChangeBetween(previous, NumberSettings());
@@ -198,7 +198,7 @@ Finding CheckEnvironment(Context& context) {
   return ToFinding(failure, "rounding mode and locale are unchanged");
 }
 
-Finding CheckDeterministic(Context& context) {
+CheckResult CheckDeterministic(Context& context) {
   const std::string failure =
       FirstFailure(context, [&](const Function& f, const CheckedState& state) {
         static_cast<void>(context.Call(f, state));
@@ -210,7 +210,7 @@ Finding CheckDeterministic(Context& context) {
   return ToFinding(failure, "consecutive calls return the same bits");
 }
 
-Finding CheckPure(Context& context) {
+CheckResult CheckPure(Context& context) {
   std::vector<Answer> first;
   const auto record_answer = [&](const Function& f, const CheckedState& state) {
     first.push_back(context.Call(f, state));
@@ -237,7 +237,7 @@ Finding CheckPure(Context& context) {
   return ToFinding(failure, "results do not depend on earlier calls or other instances");
 }
 
-Finding CheckOutputs(Context& context) {
+CheckResult CheckOutputs(Context& context) {
   const std::string failure =
       FirstFailure(context, [&](const Function& f, const CheckedState& state) {
         if (f.is_noise) return std::string();  // the check `noise` tests these functions
@@ -251,7 +251,7 @@ Finding CheckOutputs(Context& context) {
   return ToFinding(failure, "all outputs are written, finite and valid points of their geometry");
 }
 
-Finding CheckFailure(Context& context) {
+CheckResult CheckFailure(Context& context) {
   int failed = 0;
   const std::string failure =
       FirstFailure(context, [&](const Function& f, const CheckedState& state) {
@@ -270,7 +270,7 @@ Finding CheckFailure(Context& context) {
   return ToFinding(failure, std::to_string(failed) + " failed calls left their outputs unchanged");
 }
 
-Finding CheckLeaks(Context& context) {
+CheckResult CheckLeaks(Context& context) {
   // The allocator retains a limited amount of freed memory, so the heap grows in some parts of the
   // test without a leak. With a leak, it grows in every part.
   constexpr int kWarmUp = 5, kRounds = 100, kParts = 10;

@@ -50,13 +50,16 @@ std::string RejectionRecoveryText(const EkfOptions& options, const Problem& prob
   }
   std::string after = " after " + std::to_string(options.rejection_recovery_after) +
                       " consecutive rejections of a sensor";
+  if (std::isfinite(options.rejection_recovery_after_s)) {
+    after += " or " + NumberText(options.rejection_recovery_after_s) + " s";
+  }
   if (!unaffected.empty()) {
     after += "; no effect for sensors that do not correct a block: " + Join(unaffected);
   }
   switch (options.rejection_recovery) {
     case RejectionRecovery::kReset:
-      return "reset the block that the measurement determines, or inflate the covariance of the "
-             "blocks of the sensor," +
+      return "reset the block that the sensor determines, or widen the block that explains the "
+             "rejections best," +
              after;
     case RejectionRecovery::kInflate:
       return "inflate the covariance of the blocks of the sensor," + after;

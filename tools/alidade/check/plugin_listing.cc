@@ -77,10 +77,11 @@ std::vector<const PluginEntry*> EntriesNamed(const PluginHost& host, const std::
   for (const PluginEntry* entry : entries) names.push_back(entry->name);
   std::erase_if(entries, [&](const PluginEntry* entry) { return entry->name != name; });
   if (entries.empty() && FindEstimatorType(name) == nullptr) {
+    const std::string nearest = Nearest(name, names);
     throw Error(ExitCode::kPlugin,
                 ErrorLine({}, {}, "no plugin entry or built-in estimator is named '" + name + "'",
-                          "a name from `alidade plugins list`", Nearest(name, names)) +
-                    "\n" + PluginPlaces(host));
+                          "a name from `alidade plugins list`", nearest) +
+                    (nearest.empty() ? "\n" + PluginPlaces(host) : ""));
   }
   return entries;
 }

@@ -17,6 +17,16 @@
 /// past data only, so over the run it is not compared with a smoother of all data.
 namespace alidade {
 
+/// Condition under which a comparison adds the full-information filter, which solves a batch at
+/// every frame.
+enum class FullInformation {
+  /// Unless it would take 10 s or more of CPU time, and more than half of the whole. If the time
+  /// cannot be predicted: unless the system has landmarks.
+  kIfFast,
+  kAlways,
+  kNever,
+};
+
 /// Options of a comparison.
 struct CompareOptions {
   /// Reference of the errors: `truth`, or the name of an estimator. If this option is empty, the
@@ -27,11 +37,14 @@ struct CompareOptions {
   bool decompose = true;
   /// True: the comparison is over several seeds, and the source is read once for each seed.
   bool over_seeds = false;
+  std::int64_t runs = 1;  ///< number of runs of the comparison
   /// Time budget, s. Over seeds, the budget limits the wall-clock time. A run other than the first
   /// is not started if it would probably exceed the budget. For a single run, the budget limits the
   /// CPU time, which is predicted for each estimator from the first frames. An estimator is not
   /// added if the sum of the predicted times would exceed the budget.
   std::optional<double> budget_s = {};
+  /// If a single run has a budget, the budget replaces the condition kIfFast.
+  FullInformation full_information = FullInformation::kIfFast;
 };
 
 /// One estimator of a comparison. The values include the metrics of run.json. Metrics that need
@@ -118,12 +131,15 @@ struct ComparedExperiment {
   /// Note for steps that lack an estimator because of the budget. It is empty if the budget does
   /// not exclude an estimator.
   std::string beyond_budget = {};
+  /// Note on the full-information filter if it is omitted because of its predicted CPU time, or "".
+  std::string too_slow = {};
 };
 
 /// Builds the experiment of a config and adds the estimators that the comparison needs: the batch
 /// of all data, the full-information filter, the batch of the accepted measurements, and the
 /// smoother. Each added estimator has the sensors, overrides and steps of the filter. An estimator
-/// is omitted if it does not support the problem, or if it would exceed the budget of a single run.
+/// is omitted if it does not support the problem, if it would exceed the budget of a single run, or
+/// because of CompareOptions::full_information.
 /// Errors: those of BuildExperiment(); kUsage if an estimator in `options` does not exist, or if
 /// `options.filter` is not an online filter.
 ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHost& host,

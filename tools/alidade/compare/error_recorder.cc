@@ -38,8 +38,8 @@ ErrorRecorder::ErrorRecorder(const EstimatorSpec& spec, const Experiment& experi
         experiment.truth_sigmas.empty() ? truths[truth].sigma : experiment.truth_sigmas.at(truth);
     const std::string& owner = layout[id].owner;
     const auto position = std::ranges::find(series_.owners, owner);
-    blocks_.push_back(
-        {id, truth, static_cast<std::size_t>(position - series_.owners.begin()), sigma * sigma});
+    blocks_.push_back({id, truth, static_cast<std::size_t>(position - series_.owners.begin()),
+                       sigma * sigma, LargestPriorSigma(spec.problem, id)});
     blocks_.back().error.resize(layout[id].geometry().tangent);
     if (position == series_.owners.end()) series_.owners.push_back(owner);
     series_.blocks.push_back(layout[id].name);
@@ -111,7 +111,7 @@ void ErrorRecorder::AppendTimestamp(Timestamp timestamp, const State& state) {
     std::vector<BlockError> errors;
     for (const TrackedBlock& tracked : blocks_) {
       if (tracked.has_error && tracked.owner == owner) {
-        errors.push_back({tracked.id, &tracked.error, tracked.truth_variance});
+        errors.push_back({tracked.id, &tracked.error, tracked.truth_variance, tracked.prior_sigma});
       }
     }
     const Nees nees = JointNees(state, errors);

@@ -30,7 +30,7 @@ class ErrorRecorder {
   struct TrackedBlock {
     BlockId id;
     std::size_t truth, owner;
-    double truth_variance;
+    double truth_variance, prior_sigma;
     Eigen::VectorXd error = {};
     bool has_error = false;
     double bound = 0.0;            ///< trace of the bound P of the block

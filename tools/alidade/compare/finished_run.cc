@@ -12,9 +12,9 @@
 
 #include "alidade/base/text.h"
 #include "alidade/compare/json_node.h"
+#include "alidade/compare/run_files.h"
 #include "alidade/experiment/metric_key.h"
 #include "alidade/io/number_rows.h"
-#include "alidade/io/read_file.h"
 #include "alidade/io/text_cell.h"
 
 namespace alidade::internal {
@@ -23,40 +23,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-[[noreturn]] void FailFile(const fs::path& file, int line, const std::string& message) {
-  throw Error(ExitCode::kBadData, ErrorLine(Place{file.string(), line}, {}, message,
-                                            "an unmodified run folder; repeat the run"));
-}
-
-[[noreturn]] void FailOpen(const fs::path& file) {
-  throw Error(ExitCode::kInputMissing,
-              ErrorLine(Place{file.string()}, {}, "the file cannot be read",
-                        "the folder of a finished run"));
-}
-
-/// Refuses a path that is not a regular file. Reading from a pipe could block the program.
-void RequireFile(const fs::path& file) {
-  std::error_code error;
-  if (!fs::exists(file, error)) FailOpen(file);
-  if (!fs::is_regular_file(file, error)) FailFile(file, 0, "this is not a regular file");
-}
-
-std::ifstream Open(const fs::path& file) {
-  RequireFile(file);
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) FailOpen(file);
-  return stream;
-}
-
-Json ReadJson(const fs::path& file) {
-  constexpr std::uintmax_t kMaxBytes = 1 << 28;
-  RequireFile(file);
-  if (fs::file_size(file) > kMaxBytes) FailFile(file, 0, "the file is larger than 256 MiB");
-  const std::string text = ReadFile(
-      file, [&](ExitCode, int) { FailOpen(file); }, kMaxBytes);
-  return ParseJson(text, file.string());
-}
 
 std::string TextOf(const JsonNode& map, const char* key) {
   const auto node = map.Find(key);
@@ -128,7 +94,7 @@ void AppendRow(Series& series, const EstimateCells& cells, const std::vector<dou
 std::int64_t ReadEstimates(const fs::path& file, const EstimateCells& cells, std::int64_t rows,
                            Series& series) {
   std::int64_t not_finite = 0;
-  std::ifstream stream = Open(file);
+  std::ifstream stream = OpenFile(file);
   std::string line;
   std::getline(stream, line);
   for (int number = 2; std::getline(stream, line); ++number) {
@@ -159,7 +125,7 @@ void ReadCovariances(const fs::path& file, Series& series) {
   if (fs::file_size(file) != static_cast<std::uintmax_t>(bytes)) {
     FailFile(file, 0, "the size does not match the number of rows of estimates.csv");
   }
-  Open(file).read(reinterpret_cast<char*>(cells.data()), bytes);
+  OpenFile(file).read(reinterpret_cast<char*>(cells.data()), bytes);
   series.covariances = std::move(cells);
 }
 
@@ -183,6 +149,15 @@ std::vector<SeriesBlock> ReadBlocks(const JsonNode& entry) {
   return blocks;
 }
 
+Verdict VerdictOf(const JsonNode& entry) {
+  std::vector<std::string> names;
+  for (const VerdictInfo& info : kVerdicts) names.emplace_back(info.name);
+  Verdict verdict;
+  verdict.state = static_cast<VerdictState>(entry.At("state").Choice(names));
+  verdict.because = entry.At("because").Text();
+  return verdict;
+}
+
 EstimatorResult ReadResult(const std::string& name, const JsonNode& entry) {
   EstimatorResult result;
   result.name = name;
@@ -199,12 +174,11 @@ EstimatorResult ReadResult(const std::string& name, const JsonNode& entry) {
   for (const auto& [key, value] : entry.At("metrics").Entries()) {
     if (key == "diverged") {
       result.diverged = value.Flag();
-    } else if (key == "inconsistent") {
-      result.inconsistent = value.Flag();
     } else {
       result.metrics[key] = value.Number();
     }
   }
+  result.verdict = VerdictOf(entry.At("verdict"));
   for (const auto& [key, value] : entry.At("counts").Entries()) {
     result.counts[key] = value.Count();
   }
@@ -267,21 +241,12 @@ ComparedRun ReadRun(const fs::path& folder) {
   ComparedRun run;
   run.folder = folder;
   const fs::path run_file = folder / "run.json", timing_file = folder / "timing.json";
-  if (fs::exists(folder / "sweep.json")) {
-    throw Error(ExitCode::kBadData,
-                ErrorLine(Place{folder.string()}, {}, "this is the folder of a sweep",
-                          "folders that `alidade run` has written"));
-  }
-  const Json run_json = ReadJson(run_file);
+  const Json run_json = ReadRunJson(folder);
   const JsonNode root(run_json, run_file.string());
-  if (root.At("status").Text() == "running") {
-    throw Error(ExitCode::kBadData,
-                ErrorLine(Place{folder.string()}, {}, "the run is not finished", "a finished run"));
-  }
-  const Json timing_json = ReadJson(timing_file);
+  const Json timing_json = ReadJsonFile(timing_file);
   const JsonNode timing(timing_json, timing_file.string());
   const fs::path columns_file = folder / "columns.json";
-  const Json columns_json = ReadJson(columns_file);
+  const Json columns_json = ReadJsonFile(columns_file);
   const JsonNode columns(columns_json, columns_file.string());
   run.status = static_cast<RunStatus>(root.At("status").Choice({"ok", "stopped", "failed"}));
   run.reason = root.At("reason").Text();

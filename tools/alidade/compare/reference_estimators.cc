@@ -202,13 +202,8 @@ ComparedExperiment Build(const Config& config, const PluginHost& host,
       left_out[found->second].emplace_back(variant.description);
       continue;
     }
-    const bool may_be_long = !options.budget_s || options.over_seeds;
-    if (variant.full_information && filter_spec.problem.landmarks && may_be_long) {
-      left_out
-          ["with landmarks, a solve at every frame takes long; add the estimator to the config, "
-           "or, "
-           "for a single run, use --budget SECONDS"]
-              .emplace_back(variant.description);
+    if (variant.full_information && options.full_information == FullInformation::kNever) {
+      left_out["--full-information never"].emplace_back(variant.description);
       continue;
     }
     AddVariant(variant, host, compared, left_out);
@@ -254,21 +249,78 @@ std::map<std::string, std::string> FindBeyondBudget(ComparedExperiment& compared
   return beyond;
 }
 
+/// Returns the reason to omit the estimator `name` according to FullInformation::kIfFast, or "". If
+/// the CPU time cannot be predicted, as for a recording of unknown length, only an estimator with
+/// landmarks is omitted.
+std::string FindSlowness(ComparedExperiment& compared, const std::string& name, std::int64_t runs) {
+  constexpr double kFast_s = 10.0, kMaxShare = 0.5;
+  constexpr const char* kRemedy = "; --full-information always includes it";
+  std::optional<internal::PredictedCpuTime> prediction;
+  try {
+    internal::CheckReadableAgain(compared.config);
+    prediction = internal::PredictCpuTime(compared.experiment);
+  } catch (const Error&) {  // the data can be read only once
+  }
+  const auto& estimators = compared.experiment.estimators;
+  if (!prediction) {
+    const auto found = std::ranges::find(estimators, name, &EstimatorSpec::name);
+    if (!found->problem.landmarks) return "";
+    return std::string("with landmarks, a solve at every frame takes long") + kRemedy;
+  }
+  double filter_s = 0.0, sum_s = 0.0;
+  for (std::size_t e = 0; e < prediction->cpu_s.size(); ++e) {
+    const double cpu_s = static_cast<double>(runs) * prediction->cpu_s[e];
+    sum_s += cpu_s;
+    if (estimators[e].name == name) filter_s = cpu_s;
+  }
+  if (filter_s < kFast_s || filter_s <= kMaxShare * sum_s) return "";
+  return "it would take about " + internal::RoundedText(filter_s, 2) + " s of " +
+         internal::RoundedText(sum_s, 2) + " s of CPU time" + kRemedy;
+}
+
+/// Returns the name of the full-information filter that was added, or "".
+std::string AddedFullInformation(const ComparedExperiment& compared) {
+  for (const EstimatorSpec& spec : compared.experiment.estimators) {
+    const bool is_added = std::ranges::count(compared.added, spec.name) > 0;
+    if (is_added && spec.kind == EstimatorKind::kBatch && !spec.estimator->offline())
+      return spec.name;
+  }
+  return "";
+}
+
+/// Builds the experiment again, without the added estimators that exceed the budget of the run.
+ComparedExperiment BuildWithinBudget(const Config& config, const PluginHost& host,
+                                     const CompareOptions& options, ComparedExperiment& compared) {
+  std::string note;
+  const auto beyond = FindBeyondBudget(compared, *options.budget_s, note);
+  ComparedExperiment affordable = Build(config, host, options, beyond);
+  affordable.notes.push_back(note);
+  if (!beyond.empty()) {
+    affordable.beyond_budget = "the budget of " + internal::RoundedText(*options.budget_s, 2) +
+                               " s excludes some of the omitted estimators";
+  }
+  return affordable;
+}
+
 }  // namespace
 
 ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHost& host,
                                            const CompareOptions& options) {
   if (options.over_seeds || options.budget_s) internal::CheckReadableAgain(config);
   ComparedExperiment compared = Build(config, host, options, {});
-  if (options.over_seeds || !options.budget_s || compared.added.empty()) return compared;
-  std::string note;
-  const auto beyond = FindBeyondBudget(compared, *options.budget_s, note);
+  if (compared.added.empty()) return compared;
+  if (options.budget_s && !options.over_seeds) {
+    return BuildWithinBudget(config, host, options, compared);
+  }
+  const std::string name = AddedFullInformation(compared);
+  if (name.empty() || options.full_information == FullInformation::kAlways) return compared;
+  const std::string reason = FindSlowness(compared, name, options.runs);
   // The experiment is built again, because the prediction has read the source.
-  compared = Build(config, host, options, beyond);
-  compared.notes.push_back(note);
-  if (!beyond.empty()) {
-    compared.beyond_budget = "the budget of " + internal::RoundedText(*options.budget_s, 2) +
-                             " s excludes some of the omitted estimators";
+  std::map<std::string, std::string> excluded;
+  if (!reason.empty()) excluded[name] = reason;
+  compared = Build(config, host, options, excluded);
+  if (!reason.empty()) {
+    compared.too_slow = "the comparison omits the full-information filter: " + reason;
   }
   return compared;
 }

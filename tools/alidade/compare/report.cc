@@ -401,8 +401,9 @@ std::vector<std::string> RatioLines(const Comparison& comparison) {
 std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
   std::vector<Section> sections;
   Section& head = sections.emplace_back();
-  head.title = comparison.runs > 1 ? std::to_string(comparison.runs) + " runs, mean [5 %, 95 %]"
-                                   : std::to_string(comparison.frames) + " frames";
+  head.title = comparison.runs > 1
+                   ? std::to_string(comparison.runs) + " runs, mean [5 % and 95 % quantiles]"
+                   : std::to_string(comparison.frames) + " frames";
   head.title += comparison.reference.empty() ? ""
                 : comparison.reference == "truth"
                     ? ", errors relative to truth"

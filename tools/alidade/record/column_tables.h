@@ -13,6 +13,7 @@
 #include "alidade/experiment/source.h"
 #include "alidade/record/columns.h"
 #include "alidade/record/recorded_run.h"
+#include "alidade/state/dense_algebra.h"
 #include "alidade/state/element_names.h"
 
 /// Columns of the csv files of a run folder. There is one table for each file. To add a column to a
@@ -319,6 +320,10 @@ inline constexpr std::array kInnovationColumns =
         {"nis", "", "r' S^-1 r, not divided by `dof`; empty if S was not computed",
          [](const auto&, const InnovationRow& row, CsvFile& file) {
            row.is_predicted() ? file.Number(row.report.nis) : file.Empty();
+         }},
+        {"log_det_s", "", "log det S; empty if S was not computed or is not positive definite",
+         [](const auto&, const InnovationRow& row, CsvFile& file) {
+           WriteFinite(LogDeterminant(row.report.s, row.report.dof), file);
          }},
         {"z", "unit of the sensor", "each ambient element of the measurement z",
          [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {

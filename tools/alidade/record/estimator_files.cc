@@ -41,6 +41,7 @@ RecordedEstimator EstimatorFiles::Describe(const EstimatorSpec& spec) {
     sensor.stream = binding.stream;
     sensor.unit = space.unit;
     sensor.tangent = space.geometry.tangent;
+    sensor.series = InnovationSeries(binding);
     sensor.has_landmark = sensor.has_several = binding.model->has_landmark();
     recorded.width = std::max(recorded.width, space.geometry.ambient);
   }

@@ -24,7 +24,7 @@ std::string RangeOf(const std::string& axis) {
          low + " + " + high + " + longest / 4) / 2)]";
 }
 
-constexpr const char* kAxes[] = {"x", "y", "z"};
+constexpr const char* kAxisNames[] = {"x", "y", "z"};
 
 /// What the views are drawn from.
 struct MapData {
@@ -54,10 +54,11 @@ void AddLandmarks(FigureScript& script, const MapData& data, const LandmarkStyle
                   int v) {
   const auto place = [&](const std::string& prefix) {
     return "(strcol('status') eq '" + std::string(style.status) + "' ? " +
-           GnuplotColumn(prefix + kAxes[u]) + " : NaN):(" + GnuplotColumn(prefix + kAxes[v]) + ')';
+           GnuplotColumn(prefix + kAxisNames[u]) + " : NaN):(" +
+           GnuplotColumn(prefix + kAxisNames[v]) + ')';
   };
   const auto bar = [](int axis) {
-    return ":(3 * " + GnuplotColumn(std::string("sigma_") + kAxes[axis]) + ')';
+    return ":(3 * " + GnuplotColumn(std::string("sigma_") + kAxisNames[axis]) + ')';
   };
   const std::string key = style.key;
   if (style.bars != nullptr) {
@@ -71,7 +72,7 @@ void AddLandmarks(FigureScript& script, const MapData& data, const LandmarkStyle
 
 /// The view along the third axis, u to the right and v upwards.
 void AddView(FigureScript& script, const MapData& data, int u, int v) {
-  const std::string across = kAxes[u], up = kAxes[v];
+  const std::string across = kAxisNames[u], up = kAxisNames[v];
   script.Set("set xlabel '" + across + " [m]' offset 0,0.5 noenhanced");
   script.Set("set xrange " + RangeOf(across) + "\nset yrange " + RangeOf(up));
   if (data.map.removed > 0) AddLandmarks(script, data, kRemoved, u, v);
@@ -101,7 +102,7 @@ FigureScript MapFigure(const RecordedRun& run, const RecordedEstimator& estimato
   script.Panel("", "y [m]");
   script.Set("longest = 0.0");
   for (int i = 0; i < 3; ++i) {
-    MapRange(script, data.path_file, data.path[i].name, data.map_file, kAxes[i]);
+    MapRange(script, data.path_file, data.path[i].name, data.map_file, kAxisNames[i]);
   }
   script.Set("step = tic_step(longest / 8)\nset xtics step\nset ytics step");
   script.Set("set size ratio -1\nset lmargin 9\nset rmargin 2\nset bmargin 3\nunset key");

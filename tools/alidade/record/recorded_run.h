@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "alidade/base/timestamp.h"
+#include "alidade/experiment/innovation_series.h"
 #include "alidade/record/estimate_series.h"
 
 /// Description of the csv files of a run folder, for figures. Columns are identified by name.
@@ -57,6 +58,7 @@ struct RecordedSensor {
   std::string stream;
   std::string unit;
   int tangent = 1;
+  InnovationSeries series;  ///< description of the innovations, without measurements
   bool has_landmark = false;
   bool has_several = false;  ///< true: a timestamp can have several measurements
   std::vector<RecordedGain> gains;

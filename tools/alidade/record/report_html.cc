@@ -27,9 +27,28 @@ std::string Pairs(const std::string& heading, const Map& values, const Print& pr
   return html + "</table></div>\n";
 }
 
+/// Returns a badge with the name of a verdict.
+std::string Badge(VerdictState verdict) {
+  const bool is_good = verdict == VerdictState::kConsistent;
+  const bool is_open =
+      verdict == VerdictState::kNotTested || verdict == VerdictState::kUnderconfident;
+  return std::string("<span class=\"badge ") +
+         (is_good   ? "ok"
+          : is_open ? "stopped"
+                    : "failed") +
+         "\">" + ToString(verdict) + "</span>";
+}
+
+/// Returns the badge of the run: its status if it did not finish, else the worst verdict.
+std::string Badge(const RunResult& result) {
+  const auto verdict = WorstVerdict(result);
+  if (verdict && result.status == RunStatus::kOk) return Badge(*verdict);
+  return std::string("<span class=\"badge ") + ToString(result.status) + "\">" +
+         ToString(result.status) + "</span>";
+}
+
 std::string Head(const RunResult& result, const Report& report) {
-  std::string html = "<h1>" + HtmlEscaped(report.title) + " <span class=\"badge " +
-                     ToString(result.status) + "\">" + ToString(result.status) + "</span></h1>\n";
+  std::string html = "<h1>" + HtmlEscaped(report.title) + ' ' + Badge(result) + "</h1>\n";
   html += "<p class=\"soft\">" + std::to_string(result.frames) + " frames, seed " +
           std::to_string(report.facts.seed) + ", " + std::to_string(result.estimators.size()) +
           (result.estimators.size() == 1 ? " estimator" : " estimators") + "</p>\n";
@@ -111,9 +130,12 @@ std::string Estimator(const EstimatorResult& result, std::size_t index, const Re
   if (!result.type.empty() && result.type != result.name) {
     html += " <span class=\"soft\">(" + HtmlEscaped(result.type) + ")</span>";
   }
-  if (result.diverged) html += " <span class=\"badge diverged\">diverged</span>";
-  if (result.inconsistent) html += " <span class=\"badge diverged\">inconsistent</span>";
-  html += "</h2>\n";
+  html += ' ' + Badge(result.verdict.state) + "</h2>\n<p>" + HtmlEscaped(result.verdict.because) +
+          "</p>\n";
+  for (const Finding& finding : result.findings) {
+    html += "<p><b>" + std::string(ToString(finding.kind)) + ":</b> " + HtmlEscaped(finding.text) +
+            "</p>\n";
+  }
   for (const std::vector<std::string>& direction : result.unobservable) {
     html += "<p><b>Unobservable:</b> " + HtmlEscaped(Join(direction)) + "</p>\n";
   }

@@ -12,8 +12,25 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns the entry of one estimator in run.json. `recorded` is null if the run ended before the
-/// files were created.
+Json JsonOf(const Verdict& verdict) {
+  return {{"state", ToString(verdict.state)},
+          {"because", verdict.because},
+          {"since_s", verdict.since == kNoTimestamp ? Json() : Json(Seconds(verdict.since))},
+          {"basis", ToString(verdict.basis)}};
+}
+
+/// Describes the innovations of a sensor. An element of r without an element of z is null.
+Json JsonOf(const InnovationSeries& series) {
+  Json z_index = Json::array();
+  for (const int index : series.z_index) z_index.push_back(index < 0 ? Json() : Json(index));
+  return {{"units", series.units},
+          {"z_index", z_index},
+          {"robust_loss", series.has_robust_loss},
+          {"landmark_prior", series.has_landmark_prior}};
+}
+
+/// Returns the entry of one estimator. `recorded` is null if the run ended before the files were
+/// created.
 Json JsonOf(const EstimatorResult& result, const RecordedEstimator* recorded) {
   Json json = {{"type", result.type}, {"kind", ToString(result.kind)}};
   if (!result.accepted_by.empty()) json["accepted_by"] = result.accepted_by;
@@ -30,11 +47,17 @@ Json JsonOf(const EstimatorResult& result, const RecordedEstimator* recorded) {
                         {"size", block.geometry.ambient}});
     }
     json["rows"] = recorded->estimate_rows;
+    Json& innovations = json["innovations"] = Json::object();
+    for (const RecordedSensor& sensor : recorded->sensors) {
+      innovations[sensor.name] = JsonOf(sensor.series);
+    }
   }
   json["failed"] = result.failed;
   Json& metrics = json["metrics"] = result.metrics;
   metrics["diverged"] = result.diverged;
-  metrics["inconsistent"] = result.inconsistent;
+  if (result.expects_poor) json["expect"] = "poor";
+  json["verdict"] = JsonOf(result.verdict);
+  json["diagnosis"] = FindingsJson(result.findings);
   json["counts"] = result.counts;
   json["units"] = result.units;
   json["events"] = CountEvents(result);
@@ -43,6 +66,17 @@ Json JsonOf(const EstimatorResult& result, const RecordedEstimator* recorded) {
 }
 
 }  // namespace
+
+Json FindingsJson(std::span<const Finding> findings) {
+  Json list = Json::array();
+  for (const Finding& finding : findings) {
+    list.push_back({{"code", ToString(finding.kind)},
+                    {"sensor", finding.sensor},
+                    {"statistic", finding.statistic},
+                    {"text", finding.text}});
+  }
+  return list;
+}
 
 std::map<std::string, std::int64_t> CountEvents(const EstimatorResult& result) {
   std::map<std::string, std::int64_t> counts;
@@ -66,6 +100,7 @@ std::string RunJson(const RunResult& result, const RunFacts& facts) {
     if (!facts.truth_sha256.empty()) data["truth"] = facts.truth_sha256;
   }
   if (!result.normalised.empty()) json["normalised"] = result.normalised;
+  if (const auto verdict = WorstVerdict(result)) json["verdict"] = ToString(*verdict);
   json["reference"] = result.reference;
   if (!result.withheld.empty()) json["withheld"] = result.withheld;
   Json& plugins = json["plugins"] = Json::array();
@@ -103,12 +138,9 @@ std::string ComparisonCsv(const RunResult& result) {
     }
     text += '\n';
   }
-  text += "diverged";
-  for (const EstimatorResult& estimator : result.estimators)
-    text += estimator.diverged ? ",true" : ",false";
-  text += "\ninconsistent";
+  text += "verdict";
   for (const EstimatorResult& estimator : result.estimators) {
-    text += estimator.inconsistent ? ",true" : ",false";
+    text += std::string(",") + ToString(estimator.verdict.state);
   }
   return text + '\n';
 }

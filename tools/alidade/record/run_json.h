@@ -2,10 +2,12 @@
 #pragma once
 
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "alidade/experiment/run.h"
+#include "alidade/io/json.h"
 #include "alidade/record/recorded_run.h"
 
 namespace alidade::internal {
@@ -20,6 +22,9 @@ struct RunFacts {
 
 /// Returns the text of `run.json` for an unfinished run. `status` is `running` or `failed`.
 std::string UnfinishedRunJson(const std::string& status, const std::string& reason);
+
+/// Returns the list of findings as in `run.json`.
+Json FindingsJson(std::span<const Finding> findings);
 
 /// Returns the text of `run.json`, which other programs read. docs/run_folder.md lists the keys.
 std::string RunJson(const RunResult& result, const RunFacts& facts);

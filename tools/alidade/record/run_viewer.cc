@@ -75,7 +75,7 @@ RunViewer::RunViewer(const Experiment& experiment, const std::string& title)
   if (!experiment.source->measures_images() && experiment.source->views() == 0) {
     throw Error(ExitCode::kBadConfig,
                 ErrorLine({}, "source", "the source has no images to show",
-                          "a source with images, such as image_tracks, or scene with `surfaces`"));
+                          "a source that reads images, or draws images from `surfaces`"));
   }
   if (experiment.out_of_sequence.policy != OutOfSequence::kReject) {
     throw Error(ExitCode::kBadConfig,

@@ -51,11 +51,17 @@ Json EstimatorsOf(const std::vector<SweepSummary>& summaries) {
   Json json = Json::object();
   for (const SweepSummary& summary : summaries) {
     Json& entry = json[summary.name];
-    entry = {{"diverged", summary.diverged}, {"inconsistent", summary.inconsistent}};
+    entry["used"] = summary.used;
+    Json& verdicts = entry["verdicts"] = Json::object();
+    for (const VerdictInfo& verdict : kVerdicts) {
+      verdicts[verdict.name] = summary.CountOf(verdict.state);
+    }
     Json& metrics = entry["metrics"] = Json::object();
     for (const auto& [key, spread] : summary.metrics) {
-      metrics[key] = {
-          {"mean", spread.mean}, {"p05", spread.p05}, {"p50", spread.p50}, {"p95", spread.p95}};
+      const Interval& interval = summary.mean_intervals.at(key);
+      metrics[key] = {{"mean", spread.mean},        {"mean_low", interval.low},
+                      {"mean_high", interval.high}, {"p05", spread.p05},
+                      {"p50", spread.p50},          {"p95", spread.p95}};
     }
     Json& nees = entry["bounds"] = Json::object();
     for (const auto& [key, bounds] : internal::NeesBounds(summary)) {
@@ -88,11 +94,14 @@ std::string SweepJson(const VariedSweep& sweep) {
                       {"withheld", CountWithheld(*part.result)},
                       {"estimators", EstimatorsOf(Summarise(*part.result))}});
   }
-  return internal::JsonText({{"status", StatusOf(sweep.stopped())},
-                             {"runs", sweep.results.front().runs},
-                             {"first_seed", sweep.results.front().first_seed},
-                             {"vary", sweep.variation.key},
-                             {"values", std::move(values)}});
+  return internal::JsonText(
+      {{"status", StatusOf(sweep.stopped())},
+       {"runs", sweep.results.front().runs},
+       {"first_seed", sweep.results.front().first_seed},
+       {"vary", sweep.variation.key},
+       {"scope", sweep.variation.scope == Variation::Scope::kConfig ? "config" : "estimators"},
+       {"warning", sweep.warning},
+       {"values", std::move(values)}});
 }
 
 /// Returns a result that contains the keys of all metrics and counts of all runs. OrderedMetrics()
@@ -154,14 +163,14 @@ void WriteRuns(const OutputFolder& folder, const Parts& parts, const std::string
   const RunResult keys = AllKeys(parts);
   Columns<double> metrics(internal::OrderedMetrics(keys));
   Columns<std::int64_t> counts(internal::OrderedCounts(keys));
-  std::vector<std::string> header = Header(key, {"seed", "estimator", "diverged", "inconsistent"});
+  std::vector<std::string> header = Header(key, {"seed", "estimator", "verdict"});
   header.insert(header.end(), metrics.names().begin(), metrics.names().end());
   header.insert(header.end(), counts.names().begin(), counts.names().end());
   CsvFile csv(folder, "runs.csv", header);
   const auto write_run = [&](const Part& part, const SweepRun& run, const SweepRow& row) {
     if (!key.empty()) csv.Text(part.value);
     csv.Integer(static_cast<std::int64_t>(run.seed)).Text(row.name);
-    csv.Text(row.diverged ? "true" : "false").Text(row.inconsistent ? "true" : "false");
+    csv.Text(ToString(row.verdict));
     for (const double* const value : metrics.Arrange(row.metrics)) {
       value == nullptr ? csv.Empty() : csv.Number(*value);
     }

@@ -44,7 +44,7 @@ std::string TextOfEstimator(const SweepRow& row) {
   const auto count = [](std::int64_t value) { return std::to_string(value); };
   const auto unit = [](const std::string& value) { return JsonString(value); };
   return "{\"name\":" + JsonString(row.name) + ",\"diverged\":" + TextOfFlag(row.diverged) +
-         ",\"inconsistent\":" + TextOfFlag(row.inconsistent) +
+         ",\"verdict\":" + JsonString(ToString(row.verdict)) +
          ",\"failed\":" + TextOfFlag(row.failed) + ',' + MapText("units", row.units, unit) + ',' +
          MapText("counts", row.counts, count) + ',' +
          MapText("metrics", row.metrics, TextOfNumber) + '}';
@@ -54,7 +54,7 @@ SweepRow EstimatorOf(const Json& json) {
   EstimatorResult result;
   result.name = json.at("name").get<std::string>();
   result.diverged = json.at("diverged").get<bool>();
-  result.inconsistent = json.at("inconsistent").get<bool>();
+  result.verdict.state = VerdictStateOf(json.at("verdict").get<std::string>()).value();
   result.failed = json.at("failed").get<bool>();
   result.units = json.at("units").get<std::map<std::string, std::string>>();
   result.counts = json.at("counts").get<std::map<std::string, std::int64_t>>();

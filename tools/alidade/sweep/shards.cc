@@ -183,24 +183,36 @@ std::vector<SweepResult> EmptyResults(const Json& summary, std::int64_t runs,
   return results;
 }
 
-std::vector<SweepResult> ReadResults(const std::vector<ShardFolder>& shards,
-                                     const std::vector<std::string>& values) {
+/// Returns the variation of a recorded command, or nullopt if no key is varied.
+std::optional<Variation> VariationOf(const std::vector<std::string>& arguments) {
+  for (const auto scope : {Variation::Scope::kConfig, Variation::Scope::kEstimators}) {
+    const std::string text = ValueOf(arguments, Variation::OptionOf(scope));
+    if (!text.empty()) return Variation::FromText(text, scope);
+  }
+  return std::nullopt;
+}
+
+/// Adds the results and the warning of the shards to `merged`.
+void ReadResults(const std::vector<ShardFolder>& shards, MergedSweep& merged) {
   const ShardFolder& first = shards.front();
   const auto runs = IntegerOf<std::int64_t>(ValueOf(first.arguments, "--runs"));
   const auto first_seed = IntegerOf<std::uint64_t>(ValueOf(first.arguments, "--first-seed"));
+  const std::vector<std::string> values =
+      merged.variation ? merged.variation->values : std::vector<std::string>{""};
   const fs::path file = first.folder / "sweep.json";
-  std::vector<SweepResult> results;
   try {
-    results = EmptyResults(ParseJson(TextOf(file), file.string()), runs, first_seed);
+    const Json summary = ParseJson(TextOf(file), file.string());
+    merged.results = EmptyResults(summary, runs, first_seed);
+    if (merged.variation) merged.warning = summary.at("warning").get<std::string>();
   } catch (const Json::exception&) {
+    merged.results.clear();
   }
-  if (results.size() != values.size())
+  if (merged.results.size() != values.size())
     FailData(file, "this is not a sweep.json of this alidade version");
   SharedNames pool;
   for (const ShardFolder& folder : shards) {
-    AddRuns(folder, SeedsOf(folder.shard, first_seed, runs), values, pool, results);
+    AddRuns(folder, SeedsOf(folder.shard, first_seed, runs), values, pool, merged.results);
   }
-  return results;
 }
 
 }  // namespace
@@ -214,13 +226,13 @@ MergedSweep MergeShards(const std::vector<fs::path>& folders) {
   }
   SortByIndex(shards);
   const ShardFolder& first = shards.front();
-  const std::string varied = ValueOf(first.arguments, "--vary");
-  std::optional<Variation> variation;
-  if (!varied.empty()) variation = Variation::FromText(varied);
-  std::vector<SweepResult> results =
-      ReadResults(shards, variation ? variation->values : std::vector<std::string>{""});
-  return {Config::FromText(first.input_texts.config, (first.folder / kResolvedConfig).string()),
-          first.input_texts.inputs, std::move(variation), std::move(results)};
+  MergedSweep merged{
+      Config::FromText(first.input_texts.config, (first.folder / kResolvedConfig).string()),
+      first.input_texts.inputs,
+      VariationOf(first.arguments),
+      {}};
+  ReadResults(shards, merged);
+  return merged;
 }
 
 }  // namespace alidade::internal

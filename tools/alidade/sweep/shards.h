@@ -18,6 +18,7 @@ struct MergedSweep {
   std::string inputs;                  ///< text of inputs.json
   std::optional<Variation> variation;  ///< nullopt: no key is varied
   std::vector<SweepResult> results;    ///< one for each value; one entry if no key is varied
+  std::string warning = {};            ///< as in VariedSweep
 };
 
 /// Reads the folders of all shards of one sweep, in any order. Errors: kInputMissing if a folder or

@@ -11,6 +11,7 @@
 
 #include "alidade/io/log.h"
 #include "alidade/sweep/finished_runs.h"
+#include "alidade/sweep/mean_interval.h"
 #include "alidade/sweep/processors.h"
 #include "alidade/sweep/reprojection.h"
 #include "alidade/sweep/sweep_config.h"
@@ -197,13 +198,13 @@ class ValuesByName {
       if (!std::isnan(value)) lists_[i]->push_back(value);
     }
   }
-  /// Computes the spread of each name with at least one value. Consumes the values.
-  std::map<std::string, Spread> ComputeSpreads() && {
-    std::map<std::string, Spread> spreads;
+  /// Computes the statistics of each name with at least one value. Consumes the values.
+  void Summarise(SweepSummary& summary) && {
     for (auto& [name, list] : values_) {
-      if (!list.empty()) spreads[name] = SpreadOf(std::move(list));
+      if (list.empty()) continue;
+      summary.mean_intervals[name] = internal::MeanInterval(list);
+      summary.metrics[name] = SpreadOf(std::move(list));
     }
-    return spreads;
   }
 
  private:
@@ -229,13 +230,15 @@ SweepSummary SummaryOf(const SweepResult& result, const std::string& name) {
       if (&row.units.names() != units) AddUnits(row.units, summary.units);
       units = &row.units.names();
       summary.diverged += row.diverged ? 1 : 0;
+      if (run.status == RunStatus::kOk) {
+        ++summary.verdicts[static_cast<std::size_t>(row.verdict)];
+      }
       if (!run.UsesMetricsOf(row)) continue;
       ++summary.used;
-      summary.inconsistent += row.inconsistent ? 1 : 0;
       values.Add(row.metrics);
     }
   }
-  summary.metrics = std::move(values).ComputeSpreads();
+  std::move(values).Summarise(summary);
   return summary;
 }
 

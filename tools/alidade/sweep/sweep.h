@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -63,16 +64,16 @@ struct SweepRow {
         metrics(result.metrics),
         counts(result.counts),
         units(result.units),
+        verdict(result.verdict.state),
         diverged(result.diverged),
-        inconsistent(result.inconsistent),
         failed(result.failed) {}
 
   std::string name;
   NamedValues<double> metrics;
   NamedValues<std::int64_t> counts;
   NamedValues<std::string> units;
+  VerdictState verdict = VerdictState::kNotTested;
   bool diverged = false;
-  bool inconsistent = false;
   bool failed = false;
 };
 
@@ -120,13 +121,22 @@ SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptio
 /// Varied keys of the config, and the values of these keys. In a run, all varied keys have the same
 /// value.
 struct Variation {
+  /// Part of the run for which the keys are varied.
+  enum class Scope {
+    kConfig,      ///< the whole run, including the source; option --vary
+    kEstimators,  ///< `overrides` of every estimator, not the source; option --vary-filter
+  };
+
   std::string key;                  ///< dotted key, as for Config::Set(), or `KEY+KEY`
   std::vector<std::string> values;  ///< values, each in YAML
+  Scope scope = Scope::kConfig;
 
   /// Parses `KEY=v1,v2,v3` or `KEY+KEY=v1,v2,v3`. A comma inside brackets, braces or quotes belongs
   /// to the value. Error: kUsage if a key or a value is missing or repeated, or a bracket is not
   /// closed.
-  static Variation FromText(const std::string& text);
+  static Variation FromText(const std::string& text, Scope scope = Scope::kConfig);
+  /// Returns the name of the option that determines the scope.
+  static const char* OptionOf(Scope scope);
   /// Returns the list of keys.
   std::vector<std::string> Keys() const;
   /// Sets all keys to the value. Errors: those of Config::Set.
@@ -137,30 +147,41 @@ struct Variation {
 struct VariedSweep {
   Variation variation;
   std::vector<SweepResult> results;  ///< one for each value; fewer if the sweep was stopped
+  /// Warning that a varied key outside `source` also changes the data of the source; "": it does
+  /// not.
+  std::string warning = {};
 
   bool stopped() const { return !results.empty() && results.back().stopped; }
 };
 
 /// Executes a sweep of `config` for each value of the variation. `options.progress` counts the runs
-/// of all values. Errors before the first run: kBadConfig if the key is `source.seed`, if
-/// the parent map of the key does not exist, or if the values lead to different estimators; those
-/// of BuildExperiment() for each value.
+/// of all values. Logs VariedSweep::warning before the first run. Errors before the first run:
+/// kBadConfig if the key is `source.seed`, if the parent map of the key does not exist, or if the
+/// values lead to different estimators; those of BuildExperiment() for each value.
 VariedSweep SweepVariation(const Config& config, const PluginHost& host,
                            const SweepOptions& options, const Variation& variation);
 
 /// Metrics of one estimator over all runs.
 struct SweepSummary {
   std::string name;
-  std::int64_t used = 0;          ///< number of runs whose metrics are used
-  std::int64_t diverged = 0;      ///< number of runs in which the estimator diverged
-  std::int64_t inconsistent = 0;  ///< number of used runs with inconsistent errors
+  std::int64_t used = 0;      ///< number of runs whose metrics are used
+  std::int64_t diverged = 0;  ///< number of runs in which the estimator diverged; not used
+  /// Number of finished runs with each verdict, in the order of kVerdicts.
+  std::array<std::int64_t, kVerdicts.size()> verdicts{};
   std::map<std::string, Spread> metrics;
+  /// 95 % interval of the mean of each metric, see internal::MeanInterval().
+  std::map<std::string, Interval> mean_intervals;
   std::map<std::string, std::string> units;  ///< units, as in EstimatorResult
+
+  /// Returns the number of runs with this verdict.
+  std::int64_t CountOf(VerdictState state) const {
+    return verdicts[static_cast<std::size_t>(state)];
+  }
 };
 /// Summarises each estimator over all runs.
 std::vector<SweepSummary> Summarise(const SweepResult& result);
 
-/// Formats mean [p05, p50, p95] of the main metrics for a terminal, in a column for each estimator.
+/// Formats the counts of verdicts and the statistics of the main metrics for a terminal.
 /// `summaries` is the result of Summarise(result).
 std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary>& summaries);
 /// Formats the means of the main metrics in a table for each estimator, with a row for each value.

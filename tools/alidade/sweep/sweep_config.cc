@@ -40,19 +40,23 @@ bool AreEqual(const SourceFrame& a, const SourceFrame& b) {
 
 }  // namespace
 
+bool HaveEqualData(Source& a, Source& b) {
+  SourceFrame a_frame, b_frame;
+  for (;;) {
+    const bool has_frame = a.Next(a_frame);
+    if (has_frame != b.Next(b_frame)) return false;
+    if (!has_frame) return true;
+    if (!AreEqual(a_frame, b_frame)) return false;
+  }
+}
+
 bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed) {
   CheckReadableAgain(config);
   const Config first = WithSeed(config, seed), second = WithSeed(config, seed + 1);
   const Experiment first_experiment = BuildExperiment(first, host);
   const Experiment second_experiment = BuildExperiment(second, host);
-  SourceFrame a, b;
   try {
-    for (;;) {
-      const bool has_frame = first_experiment.source->Next(a);
-      if (has_frame != second_experiment.source->Next(b)) return true;
-      if (!has_frame) return false;
-      if (!AreEqual(a, b)) return true;
-    }
+    return !HaveEqualData(*first_experiment.source, *second_experiment.source);
   } catch (const Error&) {
     return true;  // the runs will report the error
   }

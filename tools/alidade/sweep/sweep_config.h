@@ -13,8 +13,12 @@ namespace alidade::internal {
 void CheckReadableAgain(const Config& config,
                         const char* reader = "a sweep reads the source for every run");
 
-/// Returns true if the data of the source depend on the seed. Reads the data of `seed` and of the
-/// next seed up to the first difference. If an error occurs while the data are read, returns true.
+/// Returns true if both sources have equal data, including truth. Reads the data up to the first
+/// difference. Errors: those of Source::Next.
+bool HaveEqualData(Source& a, Source& b);
+
+/// Returns true if the data of the source depend on the seed. Compares the data of `seed` with
+/// those of the next seed. If an error occurs while the data are read, returns true.
 bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed);
 
 /// Throws kBadConfig for a source whose data do not depend on the seed.

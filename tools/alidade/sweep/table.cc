@@ -2,12 +2,15 @@
 #include "alidade/sweep/table.h"
 
 #include <algorithm>
+#include <array>
 #include <string_view>
+#include <utility>
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/text.h"
 #include "alidade/experiment/metric_rows.h"
 #include "alidade/io/text_table.h"
+#include "alidade/sweep/worst_seeds.h"
 
 namespace alidade::internal {
 namespace {
@@ -24,35 +27,66 @@ std::string ReferenceText(const SweepResult& result) {
          " runs, in which the reference failed, diverged or had no estimates";
 }
 
-/// Returns rows with a cell for each estimator. The mean and the quantiles are formatted as four
-/// columns of one table, so all numbers of a row have the same unit.
-std::vector<TableRow> TableRows(const std::vector<SweepSummary>& summaries) {
+/// Returns the number of used runs, and a row for each verdict that occurred.
+std::vector<TableRow> VerdictRows(const std::vector<SweepSummary>& summaries) {
+  std::vector<TableRow> rows = {{"runs used", {}}};
+  for (const SweepSummary& summary : summaries) {
+    rows[0].cells.push_back(std::to_string(summary.used));
+  }
+  for (const VerdictInfo& verdict : kVerdicts) {
+    TableRow row{verdict.name, {}};
+    std::int64_t total = 0;
+    for (const SweepSummary& summary : summaries) {
+      row.cells.push_back(std::to_string(summary.CountOf(verdict.state)));
+      total += summary.CountOf(verdict.state);
+    }
+    if (total > 0) rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+constexpr const char* kMetricsTitle =
+    "Mean over the used runs, 95 % interval of this mean, and quantiles over the used runs";
+
+/// Returns the table of the metrics, with a row for each metric of each estimator. The statistics
+/// of all estimators are formatted as columns of one table, so all numbers of a metric have the
+/// same unit.
+Table MetricTable(const std::vector<SweepSummary>& summaries) {
+  constexpr std::size_t kStatistics = 6;
   RunResult columns;
   for (const SweepSummary& summary : summaries) {
-    for (const auto member : {&Spread::mean, &Spread::p05, &Spread::p50, &Spread::p95}) {
-      EstimatorResult& column = columns.estimators.emplace_back();
-      column.units = summary.units;
-      for (const auto& [key, spread] : summary.metrics) column.metrics[key] = spread.*member;
+    const std::size_t first = columns.estimators.size();
+    columns.estimators.resize(first + kStatistics);
+    EstimatorResult* const column = &columns.estimators[first];
+    for (std::size_t i = 0; i < kStatistics; ++i) column[i].units = summary.units;
+    for (const auto& [key, spread] : summary.metrics) {
+      const Interval& interval = summary.mean_intervals.at(key);
+      const std::array<double, kStatistics> values = {spread.mean, interval.low, interval.high,
+                                                      spread.p05,  spread.p50,   spread.p95};
+      for (std::size_t i = 0; i < kStatistics; ++i) column[i].metrics[key] = values[i];
     }
   }
-  std::vector<TableRow> rows;
+  Table table{{"", "estimator", "mean", "95 % interval", "5 %", "median", "95 %"}, {}, 2};
   for (const TableRow& source : MetricRows(columns)) {
-    TableRow& row = rows.emplace_back(TableRow{source.label, {}});
-    for (std::size_t i = 0; i < source.cells.size(); i += 4) {
-      const std::string* const c = &source.cells[i];
-      row.cells.push_back(c[0] == "-" ? "-" : c[0] + " [" + c[1] + ", " + c[2] + ", " + c[3] + ']');
+    std::string label = source.label;  // only in the first row of the metric
+    for (std::size_t e = 0; e < summaries.size(); ++e) {
+      const std::string* const c = &source.cells[e * kStatistics];
+      if (c[0] == "-") continue;
+      const bool has_interval = summaries[e].used > 1;
+      table.rows.push_back({std::exchange(label, ""), summaries[e].name, c[0],
+                            has_interval ? '[' + c[1] + ", " + c[2] + ']' : "-", c[3], c[4], c[5]});
     }
   }
-  TableRow used{"runs used", {}}, diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
-  for (const SweepSummary& summary : summaries) {
-    used.cells.push_back(std::to_string(summary.used));
-    diverged.cells.push_back(std::to_string(summary.diverged));
-    inconsistent.cells.push_back(std::to_string(summary.inconsistent));
-  }
-  rows.push_back(used);
-  rows.push_back(diverged);
-  rows.push_back(inconsistent);
-  return rows;
+  return table;
+}
+
+/// Formats the table of the verdicts, the table of the metrics, and the lines below the tables.
+std::string FormatTables(const SweepResult& result, const std::vector<SweepSummary>& summaries,
+                         TableFormat format) {
+  const char* const title_end = format == TableFormat::kMarkdown ? ":\n\n" : ":\n";
+  return FormatTable(MakeTable(NamesOf(summaries), VerdictRows(summaries)), format) + '\n' +
+         kMetricsTitle + title_end + FormatTable(MetricTable(summaries), format) +
+         NeesLines(summaries) + ReferenceLines(result);
 }
 
 }  // namespace
@@ -116,10 +150,9 @@ std::string ReferenceLines(const VariedSweep& sweep) {
 std::string SweepMarkdown(const SweepResult& result, const std::vector<SweepSummary>& summaries) {
   std::string text = std::to_string(CountFinished(result)) + " of " + std::to_string(result.runs) +
                      " runs, seeds from " + std::to_string(result.first_seed) +
-                     ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge, "
-                     "including inconsistent runs.\n\n";
-  text += FormatTable(MakeTable(NamesOf(summaries), TableRows(summaries)), TableFormat::kMarkdown);
-  return text + NeesLines(summaries) + ReferenceLines(result);
+                     ". The runs in which the estimator did not diverge are used.\n\n";
+  return text + FormatTables(result, summaries, TableFormat::kMarkdown) +
+         WorstSeedLines(FindWorstSeeds(result));
 }
 
 }  // namespace alidade::internal
@@ -127,10 +160,7 @@ std::string SweepMarkdown(const SweepResult& result, const std::vector<SweepSumm
 namespace alidade {
 
 std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary>& summaries) {
-  using internal::MakeTable, internal::NamesOf, internal::TableFormat;
-  return FormatTable(MakeTable(NamesOf(summaries), internal::TableRows(summaries)),
-                     TableFormat::kText) +
-         internal::NeesLines(summaries) + internal::ReferenceLines(result);
+  return internal::FormatTables(result, summaries, internal::TableFormat::kText);
 }
 
 }  // namespace alidade

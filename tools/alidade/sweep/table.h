@@ -32,7 +32,7 @@ std::string NeesLines(const std::vector<SweepSummary>& summaries);
 std::string ReferenceLines(const SweepResult& result);
 std::string ReferenceLines(const VariedSweep& sweep);
 
-/// Returns the text of `table.md`, with a column for each estimator of `summaries`.
+/// Returns the text of `table.md`.
 std::string SweepMarkdown(const SweepResult& result, const std::vector<SweepSummary>& summaries);
 
 }  // namespace alidade::internal

@@ -4,6 +4,7 @@
 
 #include "alidade/base/text.h"
 #include "alidade/config/tree.h"
+#include "alidade/io/log.h"
 #include "alidade/io/text_table.h"
 #include "alidade/sweep/sweep.h"
 #include "alidade/sweep/sweep_config.h"
@@ -13,10 +14,8 @@ namespace {
 
 using internal::Quoted;
 
-constexpr const char* kOrigin = "--vary";
-
-[[noreturn]] void FailUsage(const std::string& message) {
-  throw Error(ExitCode::kUsage, ErrorLine(Place{kOrigin}, {}, message,
+[[noreturn]] void FailUsage(const char* option, const std::string& message) {
+  throw Error(ExitCode::kUsage, ErrorLine(Place{option}, {}, message,
                                           "KEY=v1,v2,... as in sensors.stereo.sigma_px=0.5,1,2"));
 }
 
@@ -28,7 +27,7 @@ std::string Trimmed(const std::string& text) {
 }
 
 /// Splits a list of values at the commas outside brackets, braces and quotes.
-std::vector<std::string> SplitValues(const std::string& text) {
+std::vector<std::string> SplitValues(const char* option, const std::string& text) {
   std::vector<std::string> values(1);
   int depth = 0;
   char quote = '\0';
@@ -47,14 +46,16 @@ std::vector<std::string> SplitValues(const std::string& text) {
     }
     values.back() += c;
   }
-  if (depth != 0 || quote != '\0') FailUsage(Quoted(text) + " has an unclosed bracket or quote");
+  if (depth != 0 || quote != '\0') {
+    FailUsage(option, Quoted(text) + " has an unclosed bracket or quote");
+  }
   std::ranges::transform(values, values.begin(), Trimmed);
   return values;
 }
 
 /// Refuses a key whose parent map does not exist. A misspelt key would create an unwanted map.
-void CheckKey(const Config& config, const std::string& key) {
-  const Place place{kOrigin};
+void CheckKey(const Config& config, const char* option, const std::string& key) {
+  const Place place{option};
   if (key == "source.seed") {
     internal::FailAt(place, key,
                      "the seed cannot be varied, because every value uses the same seeds",
@@ -97,7 +98,7 @@ void CheckValues(const Config& config, const PluginHost& host, const Variation& 
     const auto names = internal::NamesOf(BuildExperiment(varied, host).estimators);
     if (first_names.empty()) first_names = names;
     if (names == first_names) continue;
-    internal::FailAt(Place{kOrigin}, variation.key,
+    internal::FailAt(Place{Variation::OptionOf(variation.scope)}, variation.key,
                      "the estimators are " + internal::Join(names) + " with " + Quoted(value) +
                          ", but " + internal::Join(first_names) + " with " +
                          Quoted(variation.values.front()),
@@ -105,22 +106,66 @@ void CheckValues(const Config& config, const PluginHost& host, const Variation& 
   }
 }
 
+/// Returns a warning if varied keys outside `source` also change the data of the source, otherwise
+/// "". Compares the data for the first value with those for the last value.
+std::string DescribeSharedKeys(const Config& config, const PluginHost& host,
+                               const Variation& variation) {
+  if (variation.scope == Variation::Scope::kEstimators || variation.values.size() < 2) return "";
+  std::vector<std::string> keys = variation.Keys();
+  std::erase_if(
+      keys, [](const std::string& key) { return key == "source" || key.starts_with("source."); });
+  if (keys.empty()) return "";
+  const Variation outside{internal::Join(keys, "+"), variation.values};
+  // Each experiment refers to its config.
+  const Config first_config = ConfigWith(config, outside, outside.values.front());
+  const Config last_config = ConfigWith(config, outside, outside.values.back());
+  try {
+    const Experiment first = BuildExperiment(first_config, host);
+    const Experiment last = BuildExperiment(last_config, host);
+    if (internal::HaveEqualData(*first.source, *last.source)) return "";
+  } catch (const Error&) {
+    return "";  // the runs will report the error
+  }
+  return "--vary " + outside.key +
+         ": the source also reads this key, so the data change with its value, and a wrong value "
+         "can appear consistent; to vary the key for the estimators only, use --vary-filter";
+}
+
+/// Returns the paths of the maps in which the keys are set, each with a final dot.
+std::vector<std::string> PrefixesOf(const Config& config, Variation::Scope scope) {
+  if (scope == Variation::Scope::kConfig) return {""};
+  std::vector<std::string> prefixes;
+  const Config copy = config.Copy();
+  for (const auto& [name, entry] : copy.root().At("estimators").Entries()) {
+    prefixes.push_back("estimators." + name + ".overrides.");
+  }
+  return prefixes;
+}
+
 }  // namespace
 
-Variation Variation::FromText(const std::string& text) {
+const char* Variation::OptionOf(Scope scope) {
+  return scope == Scope::kConfig ? "--vary" : "--vary-filter";
+}
+
+Variation Variation::FromText(const std::string& text, Scope scope) {
+  const auto fail = [&](const std::string& message) {
+    FailUsage(OptionOf(scope), Quoted(text) + message);
+  };
   const std::size_t equals = text.find('=');
-  if (equals == text.npos || equals == 0) FailUsage(Quoted(text) + " does not name a key to vary");
-  Variation variation{text.substr(0, equals), SplitValues(text.substr(equals + 1))};
+  if (equals == text.npos || equals == 0) fail(" does not name a key to vary");
+  Variation variation{text.substr(0, equals), SplitValues(OptionOf(scope), text.substr(equals + 1)),
+                      scope};
   std::vector<std::string> keys = variation.Keys();
   std::ranges::sort(keys);
   if (keys.front().empty() || std::ranges::adjacent_find(keys) != keys.end()) {
-    FailUsage(Quoted(text) + " has an empty or repeated key");
+    fail(" has an empty or repeated key");
   }
   const std::vector<std::string>& values = variation.values;
   for (auto value = values.begin(); value != values.end(); ++value) {
-    if (value->empty()) FailUsage(Quoted(text) + " has an empty value");
+    if (value->empty()) fail(" has an empty value");
     if (std::find(values.begin(), value, *value) != value) {
-      FailUsage(Quoted(text) + " has the value " + Quoted(*value) + " twice");
+      fail(" has the value " + Quoted(*value) + " twice");
     }
   }
   return variation;
@@ -139,15 +184,18 @@ std::vector<std::string> Variation::Keys() const {
 }
 
 void Variation::Set(Config& config, const std::string& value) const {
-  for (const std::string& name : Keys()) config.Set(name, value, kOrigin);
+  for (const std::string& prefix : PrefixesOf(config, scope)) {
+    for (const std::string& name : Keys()) config.Set(prefix + name, value, OptionOf(scope));
+  }
 }
 
 VariedSweep SweepVariation(const Config& config, const PluginHost& host,
                            const SweepOptions& options, const Variation& variation) {
   ALIDADE_EXPECTS(!variation.values.empty());
   Config copy = config.Copy();
-  copy.Set("alidade", "1", kOrigin);
-  for (const std::string& key : variation.Keys()) CheckKey(copy, key);
+  const char* const option = Variation::OptionOf(variation.scope);
+  copy.Set("alidade", "1", option);
+  for (const std::string& key : variation.Keys()) CheckKey(copy, option, key);
   CheckValues(config, host, variation);
   const auto uses_seed = [&](const std::string& value) {
     return internal::UsesSeed(ConfigWith(config, variation, value), host, options.first_seed);
@@ -155,7 +203,8 @@ VariedSweep SweepVariation(const Config& config, const PluginHost& host,
   if (options.runs > 1 && std::ranges::none_of(variation.values, uses_seed)) {
     internal::FailUnseeded(ConfigWith(config, variation, variation.values.front()));
   }
-  VariedSweep sweep{variation, {}};
+  VariedSweep sweep{variation, {}, DescribeSharedKeys(config, host, variation)};
+  if (!sweep.warning.empty()) Log(LogLevel::kWarning, sweep.warning);
   SweepOptions value_options = options;
   for (const std::string& value : variation.values) {
     value_options.value = value;

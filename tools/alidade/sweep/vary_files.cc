@@ -62,9 +62,9 @@ ValueTable TableOf(const VariedSweep& sweep, const Column& column) {
     table.rows.push_back({sweep.variation.values[v], {}});
     const std::string of_all = " of " + std::to_string(CountFinished(result));
     table.rows[v].cells = {std::to_string(column[v].diverged) + of_all,
-                           std::to_string(column[v].inconsistent) + of_all};
+                           std::to_string(column[v].CountOf(VerdictState::kLost)) + of_all};
   }
-  table.header = {"diverged", "inconsistent"};
+  table.header = {"diverged", "lost"};
   for (const TableRow& metric : MetricRows(AsComparison(column))) {
     table.header.push_back(metric.label);
     for (std::size_t v = 0; v < table.rows.size(); ++v) {
@@ -167,14 +167,13 @@ FigureScript VariationFigure(const VariedSweep& sweep) {
         IsError(key) || key.starts_with("lag_ms:") || key.starts_with("nees.within95:");
     if (shown && key.find('@') == key.npos) MetricPanel(script, columns, key, x, rows);
   }
-  script.Panel("runs that diverged or were inconsistent", "");
+  script.Panel("runs that diverged or were lost", "");
   script.Set("unset logscale y\nset yrange [0:]");
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const std::string& name = columns[i].front().name;
     script.Curve({"sweep.csv", rows, 1},
-                 x + ":(" + ColumnNamed(name + ".diverged") + " + " +
-                     ColumnNamed(name + ".inconsistent") + ") with linespoints ls " +
-                     std::to_string(i % 8 + 1) + " pt 7 ps 0.5",
+                 x + ":(" + ColumnNamed(name + ".diverged") + " + " + ColumnNamed(name + ".lost") +
+                     ") with linespoints ls " + std::to_string(i % 8 + 1) + " pt 7 ps 0.5",
                  name);
   }
   return script;
@@ -188,7 +187,7 @@ void WriteSweepCsv(const OutputFolder& folder, const VariedSweep& sweep) {
   std::vector<std::vector<std::string>> keys;
   for (const Column& column : columns) {
     const std::string& name = column.front().name;
-    header.insert(header.end(), {name + ".used", name + ".diverged", name + ".inconsistent"});
+    header.insert(header.end(), {name + ".used", name + ".diverged", name + ".lost"});
     RunResult comparison = AsComparison(column);
     for (const std::string& key : keys.emplace_back(OrderedMetrics(comparison))) {
       for (const auto& [part, member] : kSpread) header.push_back(name + '.' + part + ':' + key);
@@ -199,7 +198,9 @@ void WriteSweepCsv(const OutputFolder& folder, const VariedSweep& sweep) {
     csv.Text(sweep.variation.values[v]);
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const SweepSummary& summary = columns[i][v];
-      csv.Integer(summary.used).Integer(summary.diverged).Integer(summary.inconsistent);
+      csv.Integer(summary.used)
+          .Integer(summary.diverged)
+          .Integer(summary.CountOf(VerdictState::kLost));
       for (const std::string& key : keys[i]) {
         const auto found = summary.metrics.find(key);
         for (const auto& [part, member] : kSpread) {
@@ -217,8 +218,10 @@ std::string VariedMarkdown(const VariedSweep& sweep) {
   std::string text =
       "Seeds " + std::to_string(first.first_seed) + " to " +
       std::to_string(first.first_seed + static_cast<std::uint64_t>(first.runs) - 1) +
-      " for each value. Means over the runs that did not diverge, including inconsistent "
-      "ones.\n";
+      " for each value" +
+      (sweep.variation.scope == Variation::Scope::kEstimators ? ", for the estimators only" : "") +
+      ". Means over the runs that did not diverge.\n";
+  if (!sweep.warning.empty()) text += "\nWarning: " + sweep.warning + ".\n";
   for (const Column& column : ColumnsOf(sweep)) {
     const ValueTable table = TableOf(sweep, column);
     const std::string corner = '`' + column.front().name + "`: " + sweep.variation.key;
@@ -247,7 +250,7 @@ std::string SweepTable(const VariedSweep& sweep) {
     const internal::ValueTable table = internal::TableOf(sweep, column);
     if (!text.empty()) text += '\n';
     text +=
-        column.front().name + ", by " + sweep.variation.key + '\n' +
+        column.front().name + ", means by " + sweep.variation.key + '\n' +
         FormatTable(internal::MakeTable(table.header, table.rows), internal::TableFormat::kText);
   }
   return text + internal::ReferenceLines(sweep);

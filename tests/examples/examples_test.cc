@@ -44,8 +44,8 @@ RunResult RunExample(const std::string& name, const Settings& settings) {
 
 /// Means over the runs of the seeds 1001 to 1200 that did not diverge.
 struct Means {
-  int diverged = 0;      ///< number of runs that diverged
-  int inconsistent = 0;  ///< number of runs that are inconsistent but did not diverge
+  int diverged = 0;  ///< number of runs that diverged
+  int lost = 0;      ///< number of runs with the verdict `lost`
   std::map<std::string, double> metrics;
   double operator[](const std::string& key) const { return metrics.at(key); }
 };
@@ -65,7 +65,7 @@ std::map<std::string, Means> Sweep(const std::string& name, const Settings& sett
         continue;
       }
       ++used[result.name];
-      mean.inconsistent += result.inconsistent ? 1 : 0;
+      mean.lost += result.verdict.state == VerdictState::kLost ? 1 : 0;
       for (const auto& [key, value] : result.metrics) mean.metrics[key] += value;
     }
   }
@@ -124,7 +124,8 @@ TEST(Examples, ScaleOnlyReportsThatLambdaIsUnobservable) {
   const RunResult run = RunExample("02_depth_scale_only", {});
   EXPECT_EQ(run.code, ExitCode::kOk);
   const EstimatorResult& ekf = run.estimators.at(0);
-  EXPECT_TRUE(ekf.inconsistent);
+  EXPECT_LE(ekf.verdict.state, VerdictState::kLost);
+  EXPECT_TRUE(HasEvent(ekf, EventKind::kLost));
   ASSERT_EQ(ekf.unobservable.size(), 1u);
   EXPECT_EQ(ekf.unobservable[0].back(), "template.inverse_distance");
   EXPECT_TRUE(HasEvent(ekf, EventKind::kUnobservable));
@@ -134,8 +135,8 @@ TEST(Examples, ScaleOnlyReportsThatLambdaIsUnobservable) {
 TEST(Examples, ScaleHeldTradesLagForNoise) {
   const auto means = Sweep("03_depth_scale_known");
   const Means &slow = means.at("R2_5"), &fast = means.at("R2_0_0005");
-  EXPECT_EQ(slow.diverged + slow.inconsistent, 0);
-  EXPECT_EQ(fast.diverged + fast.inconsistent, 0);
+  EXPECT_EQ(slow.diverged + slow.lost, 0);
+  EXPECT_EQ(fast.diverged + fast.lost, 0);
   EXPECT_GE(slow["rmse:target.depth"], 0.057);
   EXPECT_LE(slow["rmse:target.depth"], 0.062);
   EXPECT_GE(slow["lag_ms:target.depth"], 350.0);
@@ -148,7 +149,7 @@ TEST(Examples, ScaleHeldTradesLagForNoise) {
 // Experiment 5: compares the fused filter of 2017 with the principled filter on the same seeds.
 TEST(Examples, ThePrincipledFilterBeatsTheFusedFilterOf2017) {
   const Means fused = Sweep("04_depth_fused_2017").at("ekf");
-  EXPECT_EQ(fused.diverged + fused.inconsistent, 0);
+  EXPECT_EQ(fused.diverged + fused.lost, 0);
   EXPECT_GE(fused["rmse:target.depth"], 0.0019);
   EXPECT_LE(fused["rmse:target.depth"], 0.0025);
   EXPECT_GE(fused["rmse:target.depth_rate"], 0.034);
@@ -156,7 +157,7 @@ TEST(Examples, ThePrincipledFilterBeatsTheFusedFilterOf2017) {
   EXPECT_LT(std::abs(fused["lag_ms:target.depth"]), 3.0);
 
   const Means principled = Sweep("05_depth_principled").at("ekf");
-  EXPECT_EQ(principled.diverged + principled.inconsistent, 0);
+  EXPECT_EQ(principled.diverged + principled.lost, 0);
   EXPECT_LE(principled["rmse:target.depth"], 0.0021);
   EXPECT_LE(principled["rmse:target.depth_rate"], 0.035);
   EXPECT_LE(principled["rmse:target.depth"], 0.93 * fused["rmse:target.depth"]);
@@ -172,7 +173,7 @@ TEST(Examples, ThePrincipledFilterBeatsTheFusedFilterOf2017) {
 TEST(Examples, TheIteratedFilterStartsFromFarAway) {
   const auto means = Sweep("06_depth_poor_initial");
   const Means &ekf = means.at("ekf"), &iekf = means.at("iekf");
-  EXPECT_EQ(iekf.diverged + iekf.inconsistent, 0);
+  EXPECT_EQ(iekf.diverged + iekf.lost, 0);
   EXPECT_LE(iekf["rmse:target.depth"], 0.0021);
   EXPECT_LT(iekf["rmse:target.depth"], 0.95 * ekf["rmse:target.depth"]);
   for (const char* key : {"nees.within95:target@blind", "nees.within95:target@seeing"}) {
@@ -206,8 +207,8 @@ double RmsApart(const std::string& name, int seed, const std::string& block) {
 TEST(Examples, TheOrderOfTheTwoUpdatesHardlyMatters) {
   const auto means = Sweep("17_depth_update_order");
   const Means &stereo = means.at("stereo_first"), &scale = means.at("scale_first");
-  EXPECT_EQ(stereo.diverged + stereo.inconsistent, 0);
-  EXPECT_EQ(scale.diverged + scale.inconsistent, 0);
+  EXPECT_EQ(stereo.diverged + stereo.lost, 0);
+  EXPECT_EQ(scale.diverged + scale.lost, 0);
   EXPECT_GE(stereo["rmse:target.depth"], 0.0019);
   EXPECT_LE(stereo["rmse:target.depth"], 0.0025);
   EXPECT_NEAR(scale["rmse:target.depth"] / stereo["rmse:target.depth"], 1.0, 0.005);
@@ -253,7 +254,7 @@ TEST(Examples, LagAgainstNoiseHasAnOptimumAndTwoEndsThatFail) {
         .at("ekf");
   };
   const Means best = with("5e-5");
-  EXPECT_EQ(best.diverged + best.inconsistent, 0);
+  EXPECT_EQ(best.diverged + best.lost, 0);
   EXPECT_LE(best["rmse:target.depth"], 0.0023);
   for (const char* off : {"5e-6", "5e-4"}) {
     const Means ekf = with(off);
@@ -263,12 +264,12 @@ TEST(Examples, LagAgainstNoiseHasAnOptimumAndTwoEndsThatFail) {
   double lag = best["lag_ms:target.depth"];
   for (const char* r : {"5e-4", "5e-3", "5e-2", "0.5", "5"}) {
     const Means ekf = with(r);
-    EXPECT_EQ(ekf.diverged + ekf.inconsistent, 0) << r;
+    EXPECT_EQ(ekf.diverged + ekf.lost, 0) << r;
     EXPECT_GT(ekf["lag_ms:target.depth"], 1.4 * lag) << r;
     lag = ekf["lag_ms:target.depth"];
   }
   // R is a thousand times too small, so errors stay beyond 10 sigma.
-  EXPECT_EQ(with("5e-9").inconsistent, 200);
+  EXPECT_EQ(with("5e-9").lost, 200);
   // A constant estimate of 0.3 m has an RMSE of 0.1 m / sqrt(2). The RMSE of the filter is larger.
   EXPECT_GT(with("5000")["rmse:target.depth"], 0.0707);
 }
@@ -349,7 +350,7 @@ TEST(Examples, TheSmootherHalvesTheErrorOfTheFilter) {
   const auto means = Sweep("08_depth_all_estimators");
   const Means &ekf = means.at("ekf"), &rts = means.at("rts"), &root = means.at("square_root");
   const Means& batch = means.at("batch");
-  for (const auto& [name, mean] : means) EXPECT_EQ(mean.diverged + mean.inconsistent, 0) << name;
+  for (const auto& [name, mean] : means) EXPECT_EQ(mean.diverged + mean.lost, 0) << name;
   EXPECT_GE(rts["rmse:target.depth"], 0.00095);
   EXPECT_LE(rts["rmse:target.depth"], 0.0012);
   EXPECT_LE(rts["rmse:target.depth_rate"], 0.0125);
@@ -362,7 +363,7 @@ TEST(Examples, TheSmootherHalvesTheErrorOfTheFilter) {
     EXPECT_NEAR(root[key], ekf[key], 1e-6 * ekf[key]) << key;
   }
   EXPECT_GE(means.at("ukf")["nees.within95:target"], 0.95);
-  EXPECT_LE(means.at("ukf")["rmse:target.depth"], 0.0032);
+  EXPECT_LE(means.at("ukf")["rmse:target.depth"], 0.0038);
 }
 
 // The prior is depth 0.35 +- 0.1 m and lambda 3 +- 1.5 /m. Sigma points at 3.9 sigma lie beyond the
@@ -371,7 +372,7 @@ TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
   Settings alone = kPoorStart;
   alone.emplace_back("estimators", "{ukf: {type: ukf, gate: 0.9999}}");
   const Means ukf = Sweep("08_depth_all_estimators", alone).at("ukf");
-  EXPECT_EQ(ukf.diverged + ukf.inconsistent, 0);
+  EXPECT_EQ(ukf.diverged + ukf.lost, 0);
   EXPECT_LE(ukf["rmse:target.depth"], 0.0042);
   EXPECT_GE(ukf["nees.within95:target"], 0.95);
   Settings wide = kPoorStart;
@@ -382,7 +383,7 @@ TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
     const auto result = std::ranges::find(run.estimators, "ukf", &EstimatorResult::name);
     ASSERT_NE(result, run.estimators.end());
     EXPECT_TRUE(HasEvent(*result, EventKind::kGuarded)) << seed;
-    EXPECT_FALSE(result->diverged || result->inconsistent) << seed;
+    EXPECT_FALSE(result->diverged || result->verdict.state == VerdictState::kLost) << seed;
     for (const auto& [key, value] : result->metrics) {
       EXPECT_TRUE(std::isfinite(value)) << seed << ' ' << key;
     }
@@ -419,8 +420,7 @@ TEST(Examples, WhatAnEstimatorTypeDoesNotHaveIsRefusedByName) {
       {"state.target.initial.depth", "{from_measurement: stereo}"},
       {"sensors.scale.roles.inverse_distance",
        "{block: template.inverse_distance, mode: consider}"},
-      {"sensors.stereo.roles.depth", "{block: target.depth, jacobian_at: measurement}"},
-      {"estimators.one.rejection_recovery", "{after: 20}"}};
+      {"sensors.stereo.roles.depth", "{block: target.depth, jacobian_at: measurement}"}};
   for (const std::string type : {"rts", "square_root_ekf", "ukf"}) {
     for (const auto& [key, value] : unsupported) {
       try {

@@ -31,7 +31,7 @@ const std::string kOne = "{inverse_distance: 1, sigma: 0.23}";
 
 TEST(SlamInverseDepthPrior, OneIsRightAboutOneMetreAway) {
   const SweepSummary near = EightWithPrior("config.yaml", kOne);
-  EXPECT_EQ(near.inconsistent, 0);
+  EXPECT_EQ(near.CountOf(VerdictState::kLost), 0);
   EXPECT_NEAR(near.metrics.at("map.sim3.scale").mean, 1.0, 0.05);
   EXPECT_LE(near.metrics.at("rmse:cam.position").mean, 0.02);
   EXPECT_LE(near.metrics.at("nees.mean:cam").mean, 2.0);
@@ -50,7 +50,7 @@ TEST(SlamInverseDepthPrior, TheSameFilterMakesTheSameMapOfALargerScene) {
   EXPECT_NEAR(ratio("map.sim3.rmse"), larger, 1e-6 * larger);
   EXPECT_NEAR(ratio("nis.mean:pixels"), 1.0, 1e-9);
   EXPECT_NEAR(ratio("reprojection:pixels"), 1.0, 1e-9);
-  EXPECT_EQ(far.inconsistent, 8);
+  EXPECT_EQ(far.CountOf(VerdictState::kLost), 8);
   EXPECT_GE(far.metrics.at("nees.mean:cam").mean, 100.0);
 }
 
@@ -60,7 +60,7 @@ TEST(SlamInverseDepthPrior, ScaleFollowsThePriorAndTheShapeStays) {
   EXPECT_LE(low.metrics.at("map.sim3.scale").mean, 0.55);
   EXPECT_NEAR(low.metrics.at("map.sim3.rmse").mean, right.metrics.at("map.sim3.rmse").mean, 0.001);
   EXPECT_NEAR(low.metrics.at("nis.mean:pixels").mean, 1.0, 0.1);
-  EXPECT_EQ(low.inconsistent, 8);
+  EXPECT_EQ(low.CountOf(VerdictState::kLost), 8);
 }
 
 }  // namespace

@@ -49,15 +49,17 @@ TEST_F(SlamOdometryTracks, IsBetterThanDeadReckoningAndThePublishedFilter) {
   EXPECT_LE(std::exp(log_ratio), 0.90);
 }
 
-// The truth jitters by 0.035 m, which makes no filter inconsistent. In drive 0095 the odometry has
-// a speed error of 1.6 %. The filter does not model a speed error, so it is inconsistent.
+// The truth jitters by 0.035 m, which does not make a filter lost. In drive 0095 the odometry has
+// a speed error of 1.6 %. The filter does not model a speed error, so it is lost.
 TEST_F(SlamOdometryTracks, IsInconsistentOnlyWhereTheOdometryIs) {
   for (const Drive& drive : kDrives) {
     const EstimatorResult ekf = Ekf(drive);
-    EXPECT_EQ(ekf.inconsistent, std::string(drive.name) == "drive_0095") << drive.name;
+    EXPECT_EQ(ekf.verdict.state == VerdictState::kLost, std::string(drive.name) == "drive_0095")
+        << drive.name;
     EXPECT_FALSE(ekf.diverged) << drive.name;
   }
-  EXPECT_TRUE(Ekf(kDrives[0], {{"evaluate.truth_sigma", "{}"}}).inconsistent);
+  EXPECT_TRUE(Ekf(kDrives[0], {{"evaluate.truth_sigma", "{}"}}).verdict.state ==
+              VerdictState::kLost);
 }
 
 TEST_F(SlamOdometryTracks, DoesNotHangOnTheNoiseOrTheNumberOfFeatures) {

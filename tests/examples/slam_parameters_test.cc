@@ -28,7 +28,7 @@ TEST(SlamParameters, VagueInitialVelocitiesCostLittle) {
   for (const char* key :
        {"state.cam.initial.velocity.sigma", "state.cam.initial.angular_velocity.sigma"}) {
     const SweepSummary ekf = Ten(key, "1");
-    EXPECT_EQ(ekf.diverged + ekf.inconsistent, 0) << key;
+    EXPECT_EQ(ekf.diverged + ekf.CountOf(VerdictState::kLost), 0) << key;
     EXPECT_LE(Mean(ekf, "final_error:cam.position"), 0.012) << key;
     EXPECT_LE(Mean(ekf, "nees.mean:cam"), 1.3) << key;
   }
@@ -44,14 +44,14 @@ TEST(SlamParameters, TooLittleNoiseMakesTheFilterOverconfident) {
   EXPECT_LE(nees("state.cam.noise.linear_acceleration", "3"), 1.3);
   EXPECT_GE(nees("state.cam.noise.angular_acceleration", "0.015"), 2.0);
   EXPECT_LE(nees("state.cam.noise.angular_acceleration", "0.5"), 1.3);
-  EXPECT_GE(Ten("sensors.pixels.sigma_px", "0.25").inconsistent, 8);
+  EXPECT_GE(Ten("sensors.pixels.sigma_px", "0.25").CountOf(VerdictState::kLost), 8);
   EXPECT_LE(nees("sensors.pixels.sigma_px", "4"), 1.0);
 }
 
 TEST(SlamParameters, ThePriorOfTheInverseDepthHasToFitTheScene) {
   const std::string key = "landmarks.prior.inverse_distance";
   EXPECT_LE(Mean(Ten(key, "0.35"), "nees.mean:cam"), 1.4);
-  EXPECT_GE(Ten(key, "1").inconsistent, 8);
+  EXPECT_GE(Ten(key, "1").CountOf(VerdictState::kLost), 8);
   EXPECT_GE(Mean(Ten("landmarks.prior.sigma", "0.15"), "nees.mean:cam"), 1.7);
 }
 

@@ -22,7 +22,7 @@ std::map<std::string, SweepSummary> Four() {
   std::map<std::string, SweepSummary> by_name;
   for (SweepSummary& one : Summarise(Sweep(config, host, options))) {
     EXPECT_EQ(one.used, 4) << one.name;
-    EXPECT_EQ(one.diverged + one.inconsistent, 0) << one.name;
+    EXPECT_EQ(one.diverged + one.CountOf(VerdictState::kLost), 0) << one.name;
     by_name[one.name] = one;
   }
   return by_name;
@@ -40,8 +40,8 @@ TEST(SlamRepresentations, AgreeAndConversionIsHarmlessOnlyWhereItIsLinear) {
   }
   EXPECT_LE(mean("inverse_depth", "nees.mean:cam"), 1.4);
   EXPECT_GE(mean("inverse_depth", "nees.within95:cam"), 0.85);
-  // Conversion at a linearity index [Civera2008] of 40 % makes the filter inconsistent. At 60 % the
-  // filter is even more inconsistent.
+  // Conversion at a linearity index [Civera2008] of 40 % makes the filter overconfident. At 60 %
+  // the NEES is even larger.
   EXPECT_GE(mean("xyz_40", "nees.mean:cam"), 1.6);
   EXPECT_LE(mean("xyz_40", "nees.within95:cam"), 0.75);
   EXPECT_GT(mean("xyz_60", "nees.mean:cam"), mean("xyz_40", "nees.mean:cam"));

@@ -39,7 +39,7 @@ class SlamStereoTracks : public testing::DrivesTest {
       const EstimatorResult& ekf = run.estimators.at(0);
       EXPECT_LE(ekf.metrics.at("final_error:cam.position"), kMost * drive.path_m) << told;
       EXPECT_FALSE(ekf.diverged) << told;
-      EXPECT_FALSE(settings.empty() && ekf.inconsistent) << told;
+      EXPECT_FALSE(settings.empty() && ekf.verdict.state == VerdictState::kLost) << told;
     }
   }
 };

@@ -52,7 +52,7 @@ TEST(SlamThreeSensors, OneCameraSeesTheShapeAndNotTheSize) {
 
 TEST(SlamThreeSensors, ABaselineThatIsTooShortIsWorseThanNone) {
   const auto near = EightOfThreeSensors("stereo.yaml", "camera.baseline_m", "0.01");
-  EXPECT_GE(near.at("stereo").inconsistent, 3);
+  EXPECT_GE(near.at("stereo").CountOf(VerdictState::kLost), 3);
   EXPECT_GE(MeanOf(near.at("stereo"), "rmse:cam.position"), 0.04);
 }
 

@@ -92,7 +92,7 @@ const Fault kTextFaults[] = {
         {{kDepthSource,
           "{type: csv, path: \"$(touch hacked)\", streams: {disparity: d, inverse_scale: s}}"}},
         28, "$(touch hacked)", 66),
-    MakeFault("26_newer_schema", "depth", {{"alidade: 1", "alidade: 2"}}, 1, "newest"),
+    MakeFault("26_newer_schema", "depth", {{"alidade: 1", "alidade: 2"}}, 1, "newer"),
 };
 
 const Fault kKeyFaults[] = {
@@ -121,6 +121,51 @@ const Fault kKeyFaults[] = {
               "state.target.noise.acelleration: unknown key"),
     MakeFault("02_unknown_loss", "depth", {After(kStereoSigma, "    loss: {hubert: 1.345}")}, 22,
               "did you mean 'huber'"),
+    MakeFault("03_initial_is_a_number", "depth", {{"{mean: 3.3, sigma: 0.5}", "3.3"}}, 13,
+              "state.template.initial.inverse_distance: '3.3'; expected a map, as in {mean: 0, "
+              "sigma: 0.1}"),
+    MakeFault("03_initial_missing", "depth",
+              {{"    initial: {inverse_distance: {mean: 3.3, sigma: 0.5}}\n", ""}}, 10,
+              "state.template.initial: missing key, needed by the state entry 'template'; expected "
+              "initial: {inverse_distance: {mean: 0, sigma: 0.1}}"),
+    MakeFault("03_initial_sigma_missing", "depth", {{"mean: 3.3, sigma: 0.5", "mean: 3.3"}}, 13,
+              "the uncertainty of the initial value is missing; expected sigma, a standard "
+              "deviation, or covariance, a matrix"),
+    MakeFault("03_initial_variance", "depth",
+              {{"mean: 3.3, sigma: 0.5", "mean: 3.3, variance: 0.25"}}, 13,
+              "inverse_distance.variance: unknown key; did you mean 'covariance'?"),
+    MakeFault("03_initial_covariance_is_a_number", "depth",
+              {{"mean: 3.3, sigma: 0.5", "mean: 3.3, covariance: 0.25"}}, 13,
+              "not a list of rows; expected a list of one row of one number, as in [[0.01]]"),
+    MakeFault("03_estimators_are_a_list", "depth", {{"  ekf: {type: ekf}", "  - {type: ekf}"}}, 30,
+              "estimators: a list; expected a map, as in ekf: {type: ekf}"),
+    MakeFault("03_estimator_is_a_name", "depth", {{kEkf, "ekf"}}, 30,
+              "estimators.ekf: 'ekf'; expected a map, as in {type: ekf}"),
+    MakeFault("03_missing_key_with_a_longer_one", "depth", {{"focal_px", "focal_length_px"}}, 15,
+              "sensors.stereo.focal_px: missing; model 'stereo_disparity' needs it (px, > 0: "
+              "rectified focal length); found 'focal_length_px' at line 19; did you mean "
+              "'focal_px'?"),
+    MakeFault("03_quaternion_is_a_list", "pose", {{"{w: 1, x: 0, y: 0, z: 0}", "[1, 0, 0, 0]"}}, 9,
+              "orientation.mean: a list; expected a map, as in {w: 1, x: 0, y: 0, z: 0}"),
+    MakeFault("03_version_missing", "depth", {{"alidade: 1\n", ""}}, 1,
+              "alidade: missing key, needed by every config, because it is the version of the "
+              "schema; expected the first line `alidade: 1`"),
+    MakeFault("04_unit_of_an_angle", "pose",
+              {{"angular_velocity: {mean: [0, 0, 0], sigma: 0.1}",
+                "angular_velocity: {mean: [0, 0, 0], sigma: 3deg/s}"}},
+              11,
+              "angular_velocity.sigma: '3deg/s' contains a unit; expected a number or a list of "
+              "numbers (rad/s), without a unit: 0.0523598776"),
+    MakeFault("04_unit_of_an_orientation", "pose", {{"z: 0}, sigma: 0}", "z: 0}, sigma: 3deg}"}}, 9,
+              "(rad), without a unit: 0.0523598776"),
+    MakeFault("04_unit_of_a_parameter", "depth", {{"baseline_m: 0.065", "baseline_m: 65mm"}}, 20,
+              "sensors.stereo.baseline_m: '65mm' contains a unit; expected a number > 0 (m), "
+              "without a unit: 0.065"),
+    MakeFault("04_no_number_in_px", "depth", {{"400", "wide"}}, 19,
+              "'wide' is not a finite number; expected a number > 0 (px)"),
+    MakeFault(
+        "10_gate_in_percent", "depth", {{kEkf, "{type: ekf, gate: 99.9}"}}, 30,
+        "gate: '99.9' is out of range: 99.9 % is 0.999; expected a number in (0, 1), or none"),
     MakeFault("03_missing_key", "depth", {{"    focal_px: 400\n", ""}}, 15, "stereo_disparity"),
     MakeFault(
         "03_missing_nested_key_with_a_like_one", "depth", {{"noise", "niose"}}, 3,
@@ -140,6 +185,15 @@ const Fault kKeyFaults[] = {
     MakeFault("36_rollback_without_a_window", "depth",
               {After(kEkf, "out_of_sequence: {policy: rollback}")}, 31,
               "out_of_sequence.policy: 'policy: rollback' needs the key 'window_s'"),
+    MakeFault("50_missing_motion_model", "depth", {{"model: constant_velocity", "model: unicycle"}},
+              4,
+              "no plugin offers the motion model 'unicycle'; expected one of constant, "
+              "constant_velocity, odometry_pose, quaternion_pose\n",
+              69),
+    MakeFault("50_missing_source", "depth", {{kDepthSource, "{type: rosbag}"}}, 28,
+              "no plugin offers the source 'rosbag'; expected one of csv, depth_target, ", 69),
+    MakeFault("50_missing_estimator_in_upper_case", "depth", {{kEkf, "{type: UKF}"}}, 30,
+              "did you mean 'ukf'?\n", 69),
     MakeFault("50_missing_plugin", "depth", {{"stereo_disparity", "stereo_disparty"}}, 16,
               "stereo_disparity", 69),
     MakeFault("74_covariance_not_psd", "depth",
@@ -175,7 +229,8 @@ const Fault kBlockFaults[] = {
               "sensors.stereo:left: 'stereo:left' is not a valid name for a sensor"),
     MakeFault("25_name_of_a_state_entry", "depth", {{"  target:", "  the target:"}}, 4,
               "state.the target: 'the target' is not a valid name for a state entry"),
-    MakeFault("25_one_block_in_two_roles", "depth", {{kTemplateBlock, "target.depth"}}, 25,
+    MakeFault("25_one_block_in_two_roles", "depth",
+              {{"{depth: target.depth, ", "{depth: template.inverse_distance, "}}, 25,
               "another role"),
     MakeFault("25_one_name_for_two_blocks", "depth", {{"velocity: depth_rate", "velocity: depth"}},
               5, "depth"),
@@ -191,6 +246,19 @@ const Fault kBlockFaults[] = {
               29,
               "source.truth.depth: the truth does not match a block: the name could mean "
               "target.depth or template.depth"),
+    MakeFault("44_role_of_an_unknown_name", "depth", {{kStereoRoles, "{range: target.depth}"}}, 18,
+              "sensors.stereo.roles.range: unknown key; expected depth"),
+    MakeFault("44_role_missing", "depth", {{kStereoRoles, "{}"}}, 18,
+              "sensors.stereo.roles.depth: missing key, needed by model 'stereo_disparity'; "
+              "expected one of target.depth, template.inverse_distance"),
+    MakeFault("44_role_without_its_entry", "depth", {{kStereoRoles, "{depth: depth}"}}, 18,
+              "sensors.stereo.roles.depth: block 'depth' does not exist; expected one of "
+              "target.depth, template.inverse_distance; did you mean 'target.depth'?"),
+    MakeFault("44_role_of_no_block", "depth", {{kTemplateBlock, "template.lambda"}}, 25,
+              "block 'template.lambda' does not exist; expected template.inverse_distance"),
+    MakeFault("44_unit_of_a_role", "depth", {{kStereoRoles, "{depth: target.depth_rate}"}}, 18,
+              "sensors.stereo.roles.depth: block 'target.depth_rate' has the unit m/s; expected m "
+              "for role 'depth' of model 'stereo_disparity'"),
     MakeFault("44_geometry_of_a_role", "depth",
               {After(kTemplateBlocks, "    size: 2"), {"mean: 3.3", "mean: [3.3, 1]"}}, 26,
               "block 'template.inverse_distance' has geometry vector(2); expected vector(1) for "
@@ -251,8 +319,9 @@ const Fault kEstimatorFaults[] = {
         "estimators.ekf.use.accepted_by: 'alone' does not use sensor 'scale' on stream "
         "'inverse_scale'; expected an estimator with the same sensors"),
     MakeFault("key_of_another_estimator", "depth", {{kEkf, "{type: rts, alpha: 0.1}"}}, 30,
-              "estimators.ekf.alpha: unknown key; expected one of fuse, gate, max_dt_s, "
-              "on_divergence, on_plugin_failure, overrides, sensors"),
+              "estimators.ekf.alpha: unknown key; expected one of expect, fuse, gate, "
+              "max_covariance_repairs, max_dt_s, on_divergence, on_plugin_failure, overrides, "
+              "rejection_recovery, sensors, type, use"),
     MakeFault("unsupported_consider_block", "depth",
               {After(kTemplateBlocks, "    consider: [inverse_distance]"), {kEkf, "{type: rts}"}},
               13,
@@ -290,9 +359,6 @@ const Fault kEstimatorFaults[] = {
               "estimator type 'square_root_ekf' does not support landmarks"),
     MakeFault("unsupported_landmarks_ukf", "landmarks", {{kEkf, "{type: ukf}"}}, 10,
               "estimator type 'ukf' does not support landmarks"),
-    MakeFault("unsupported_rejection_recovery", "depth",
-              {{kEkf, "{type: ukf, rejection_recovery: {action: none}}"}}, 30,
-              "estimators.ekf.rejection_recovery: estimator type 'ukf' has no rejection recovery"),
     MakeFault("unsupported_start_from_a_measurement", "depth",
               {{"{mean: 0.3, sigma: 0.1}", "{from_measurement: stereo}"}, {kEkf, "{type: rts}"}}, 8,
               "state.target.initial.depth.from_measurement: estimator type 'rts' does not support "
@@ -435,6 +501,10 @@ TEST_F(ConfigText, AFolderAndAMissingFileAreInputMissing) {
     EXPECT_EQ(outcome.code, 66);
     EXPECT_EQ(outcome.err, "error: " + config + ": cannot be read: " + reason + '\n');
   };
+  fs::create_directory(folder_ / "folder");
+  Write("folder/config.yaml", kDepthConfig);
+  expect("folder", "it is a directory; did you mean 'folder/config.yaml'?");
+  expect("confg.yaml", "No such file or directory; did you mean 'config.yaml'?");
   fs::create_directory(folder_ / "folder.yaml");
   fs::create_symlink("nothing", folder_ / "link.yaml");
   expect("folder.yaml", "it is a directory");

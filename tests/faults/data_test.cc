@@ -134,7 +134,7 @@ TEST_F(DataFault, WhatIsNotBeforeTheCameraIsRejectedAndCounted) {
   EXPECT_EQ(Count("invalid:stereo"), 2);
   EXPECT_EQ(Count("accepted:stereo"), 2);
   EXPECT_TRUE(
-      Contains(Read("out/ekf/innovations.csv"), "\n0.200000000,disparity,stereo,,invalid,1,,-5,"))
+      Contains(Read("out/ekf/innovations.csv"), "\n0.200000000,disparity,stereo,,invalid,1,,,-5,"))
       << Read("out/ekf/innovations.csv");
   std::string rows;
   for (int frame = 0; frame < 4; ++frame) rows += Row(frame, 9, 0, 320) + Row(frame, 9, 1, 240);
@@ -174,15 +174,54 @@ TEST_F(DataFault, WhatIsNoDataIsExitCode65WithThePlace) {
     const std::string file = config[0] == 't' ? "table.csv" : "tracks.csv";
     Write(file, "");
     const Outcome nothing = Run(config, {}, 65);
-    EXPECT_TRUE(Contains(nothing.err, "error: " + file + ": no ") ||
-                Contains(nothing.err, '/' + file + ": no "))
+    EXPECT_TRUE(Contains(nothing.err, "error: " + file + ": the ") ||
+                Contains(nothing.err, '/' + file + ": the "))
         << nothing.err;
     Write(file, "t_s,d\n0,80\n0.1\n");
     const Outcome columns = Run(config, {}, 65);
-    EXPECT_TRUE(Contains(
-        columns.err, file + (config[0] == 't' ? ":3:4: 1 column" : ":1:6: the row has 2 columns")))
+    EXPECT_TRUE(Contains(columns.err, file + (config[0] == 't' ? ":3:4: the line has 1 column"
+                                                               : ":1:6: the row has 2 columns")))
         << columns.err;
   }
+}
+
+// The error is the last text on the terminal, and shows the line of the file.
+TEST_F(DataFault, AnErrorFollowsTheTableAndShowsTheLine) {
+  Write("table.csv", "t_s,d\n0,80\n0.1,abc\n0.2,81\n");
+  before_ = "exec 1>both 2>&1";
+  EXPECT_EQ(Call({"run", "table.yaml", "--no-figures", "-o", "out"}).code, 65);
+  const std::string both = Read("both");
+  EXPECT_TRUE(Contains(both, "\nwrote out\n")) << both;
+  EXPECT_TRUE(both.ends_with(
+      "table.csv:3:5 d: 'abc' is not a number; expected a finite number, or 'source.missing: "
+      "[\"\", abc]'\n  3 | 0.1,abc\n    |     ^\n"))
+      << both;
+}
+
+TEST_F(DataFault, ATableWithoutRowsLeavesNoRunFolder) {
+  Write("table.csv", "t_s,d\n");
+  const Outcome outcome = Run("table.yaml", {}, 65);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_TRUE(Contains(outcome.err, "the table has no rows; expected a row below the header"));
+  EXPECT_FALSE(Exists("out"));
+  EXPECT_FALSE(Exists("out.partial"));
+}
+
+TEST_F(DataFault, ATableWithoutAHeaderIsRecognised) {
+  Write("table.csv", "0.000,80\n0.1,81\n");
+  const Outcome outcome = Run("table.yaml", {}, 78);
+  EXPECT_TRUE(Contains(outcome.err, "because its first line contains numbers, not names"))
+      << outcome.err;
+}
+
+TEST_F(DataFault, AnEmptyCellNamesTheMissingCells) {
+  Write("table.csv", "t_s,d\n0,80\n0.1,\n");
+  const Outcome outcome = Run("table.yaml", {"--set", "source.missing=NA"}, 65);
+  EXPECT_TRUE(Contains(outcome.err,
+                       "table.csv:3:5 d: '' is an empty cell; expected a finite "
+                       "number, or 'source.missing: [NA, \"\"]'"))
+      << outcome.err;
+  Run("table.yaml", {"--set", "source.missing=[NA, \"\"]"});
 }
 
 // Tests fault 45 of tests/faults/README.md.
@@ -203,7 +242,7 @@ TEST_F(DataFault, APixelOutsideTheImageIsRejectedAndCounted) {
   EXPECT_EQ(Count("invalid:pixels"), 15);
   EXPECT_EQ(Count("initialised:pixels"), 7);
   EXPECT_EQ(Count("accepted:pixels"), 14);
-  EXPECT_TRUE(Contains(Read("out/ekf/innovations.csv"), ",tracks,pixels,10,invalid,2,,-0.6,100,"))
+  EXPECT_TRUE(Contains(Read("out/ekf/innovations.csv"), ",tracks,pixels,10,invalid,2,,,-0.6,100,"))
       << Read("out/ekf/innovations.csv");
   const std::string map = Read("out/ekf/landmarks.csv");
   EXPECT_TRUE(Contains(map, "\n20,"));

@@ -224,9 +224,10 @@ TEST_F(RunView, RefusesWhatItCannotShow) {
   Write("table.csv", "t_s,d\n0,80\n1,81\n");
   const Outcome blind = Call({"run", "table.yaml", "-o", "run", "--save-video", "v.avi"});
   EXPECT_EQ(blind.code, 78);
-  EXPECT_TRUE(Contains(blind.err,
-                       "source: the source has no images to show; expected a source with images, "
-                       "such as image_tracks, or scene with `surfaces`"))
+  EXPECT_TRUE(
+      Contains(blind.err,
+               "source: the source has no images to show; expected a source that reads images, "
+               "or draws images from `surfaces`"))
       << blind.err;
   EXPECT_FALSE(Exists("run"));
   EXPECT_FALSE(Exists("v.avi"));

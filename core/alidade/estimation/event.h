@@ -115,8 +115,8 @@ inline constexpr std::array kEventKinds = {
                   "or update was not used"},
     EventKindInfo{
         EventKind::kDigitsLost, "digits_lost", EventSeverity::kWarning,
-        "rounding errors change the covariance by 1 % or more, because a prior is too vague "
-        "for an accurate measurement"},
+        "rounding errors may change the covariance by 1 % or more, because a prior is too "
+        "vague for an accurate measurement"},
     EventKindInfo{EventKind::kGuarded, "guarded", EventSeverity::kWarning,
                   "sigma points left the domain of a model and were moved closer to the estimate"},
     EventKindInfo{EventKind::kNonlinear, "nonlinear", EventSeverity::kWarning,

@@ -172,13 +172,16 @@ StepError Motions::Apply(State& state) {
       return FindNotFinite();
     }
   }
-  for (const std::size_t i : active_) {
-    TakeStep(index_->motion_places[i], next_.data(), state.values().data());
-  }
+  Move(state);
   return {};
 }
 
-/// Returns the error that explains why P after the step is not finite.
+void Motions::Move(State& state) const {
+  for (const std::size_t i : active_) {
+    TakeStep(index_->motion_places[i], next_.data(), state.values().data());
+  }
+}
+
 [[gnu::noinline]] StepError Motions::FindNotFinite() const {
   for (const std::size_t i : active_) {
     const Step& step = steps_[i];
@@ -262,17 +265,23 @@ Workspace::Matrix Motions::Transition(int n, Workspace& work) const {
   return transition;
 }
 
-Workspace::Matrix Motions::NoiseColumns(std::vector<double> Step::*matrix, int n, Workspace& work,
-                                        bool with_continuous) const {
-  Workspace::Matrix input = work.Take(n, noise_size());
-  input.setZero();
+Workspace::Matrix Motions::NoiseColumns(std::vector<double> Step::*matrix, bool is_discrete, int n,
+                                        Workspace& work) const {
   Eigen::Index columns = 0;
+  for (const std::size_t i : active_) {
+    if (index_->motion_places[i].holds == is_discrete)
+      columns += index_->problem.motions[i].model->noise_size();
+  }
+  Workspace::Matrix input = work.Take(n, columns);
+  input.setZero();
+  columns = 0;
   for (const std::size_t i : active_) {
     const Step& step = steps_[i];
     const MotionPlace& place = index_->motion_places[i];
+    if (place.holds != is_discrete) continue;
     const MotionModel& model = *index_->problem.motions[i].model;
     const Eigen::Index width = model.noise_size();
-    for (std::size_t row = 0; row < place.at.size() && (place.holds || with_continuous); ++row) {
+    for (std::size_t row = 0; row < place.at.size(); ++row) {
       if (place.at[row] < 0) continue;
       const Eigen::Map<const RowMajor> block((step.*matrix).data(), model.tangent_size(), width);
       input.row(place.at[row]).segment(columns, width) = block.row(static_cast<Eigen::Index>(row));

@@ -84,6 +84,10 @@ class Motions {
   /// Computes x', F, G and Lq of all active models. If `derivatives` is false, computes only x' and
   /// Lq.
   StepError Evaluate(const State& state, double dt_s, bool derivatives = true);
+  /// Sets x <- x'. The caller propagates P.
+  void Move(State& state) const;
+  /// Returns the error that explains why P after the step is not finite.
+  StepError FindNotFinite() const;
   /// Sets P <- F P F' + N N', N = G Lq, and x <- x'. If this fails, returns the error and leaves P
   /// and x unchanged.
   StepError Apply(State& state);
@@ -98,11 +102,14 @@ class Motions {
   int noise_size() const;  ///< n_w
   // The following functions return matrices of the last step, stored in `work`.
   Workspace::Matrix Transition(int n, Workspace& work) const;  ///< F, n x n
-  /// Returns G Lq if `matrix` is &Step::gl, or M if `matrix` is &Step::m. The result is n x n_w,
-  /// with the columns of the models side by side. The columns of continuous noise are zero unless
-  /// `with_continuous` is true.
-  Workspace::Matrix NoiseColumns(std::vector<double> Step::*matrix, int n, Workspace& work,
-                                 bool with_continuous = false) const;
+  /// Returns the columns of G Lq of all models with continuous noise, side by side.
+  Workspace::Matrix ContinuousNoise(int n, Workspace& work) const {
+    return NoiseColumns(&Step::gl, false, n, work);
+  }
+  /// Returns the columns of M of all models with discrete noise, side by side.
+  Workspace::Matrix DiscreteNoise(int n, Workspace& work) const {
+    return NoiseColumns(&Step::m, true, n, work);
+  }
 
  private:
   StepError EvaluateModel(std::size_t i, const State& state, double dt_s, bool derivatives);
@@ -110,7 +117,8 @@ class Motions {
   bool IsBounded(const Covariance& p) const;
   bool Propagate(Covariance& p);
   bool PropagatePart(Covariance& p, const MotionPlace& place, const Step& step, int width);
-  StepError FindNotFinite() const;
+  Workspace::Matrix NoiseColumns(std::vector<double> Step::*matrix, bool is_discrete, int n,
+                                 Workspace& work) const;
 
   const ProblemIndex* index_;
   std::vector<Step> steps_;  ///< in the order of Problem::motions

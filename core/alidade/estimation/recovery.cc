@@ -172,7 +172,7 @@ BlockId DeterminedBlock(const FilterState& f, const SensorBinding& sensor) {
     return;
   }
   Rejections& rejections = sensors_[static_cast<std::size_t>(pending.sensor)];
-  if (rejections.last_accepted == kNoTimestamp) rejections.last_accepted = f.timestamp;
+  if (rejections.count == 0) rejections.first = f.timestamp;
   if (++rejections.count == kMostlyRejected) {
     AddEvent(f, EventKind::kMostlyRejected,
              "sensor '" + pending.binding->name + "': the last " + std::to_string(kMostlyRejected) +
@@ -199,7 +199,7 @@ BlockId DeterminedBlock(const FilterState& f, const SensorBinding& sensor) {
 bool Recovery::IsDue(const FilterState& f, const Rejections& rejections) const {
   if (rejections.attempts > kMaxAttempts) return false;
   const double factor = std::ldexp(1.0, rejections.attempts);
-  const double rejected_s = 1e-9 * static_cast<double>(f.timestamp - rejections.last_accepted);
+  const double rejected_s = 1e-9 * static_cast<double>(f.timestamp - rejections.first);
   return rejections.count >= factor * options_.rejection_recovery_after ||
          rejected_s >= factor * options_.rejection_recovery_after_s;
 }

@@ -12,8 +12,8 @@ namespace alidade::internal {
 /// rejections of each sensor, and resets or inflates blocks if there are too many. A copy is a
 /// snapshot.
 ///
-/// After N = rejection_recovery_after rejections in a row, or after rejection_recovery_after_s
-/// without an accepted measurement, a recovery is attempted. If the sensor is still rejected, the
+/// After N = rejection_recovery_after rejections in a row, or if measurements were rejected for
+/// rejection_recovery_after_s, a recovery is attempted. If the sensor is still rejected, the
 /// next attempt follows after 2 N, then 4 N, 8 N and 16 N rejections, or the respective time. After
 /// kMaxAttempts attempts, the recovery has failed (event `recovery_failed`).
 class Recovery {
@@ -35,7 +35,7 @@ class Recovery {
     if (outcome != Outcome::kAccepted && outcome != Outcome::kInitialised) {
       return CountRejection(f, pending, method);
     }
-    sensors_[static_cast<std::size_t>(pending.sensor)] = {.last_accepted = f.timestamp};
+    sensors_[static_cast<std::size_t>(pending.sensor)] = {};
     f.health.out_of_domain[static_cast<std::size_t>(pending.sensor)] = 0;
   }
 
@@ -43,8 +43,8 @@ class Recovery {
   /// Rejections of a sensor since its last accepted measurement.
   struct Rejections {
     int count = 0;
-    int attempts = 0;                        ///< attempts of a recovery
-    Timestamp last_accepted = kNoTimestamp;  ///< or the first rejection, if none was accepted
+    int attempts = 0;                ///< attempts of a recovery
+    Timestamp first = kNoTimestamp;  ///< time of the first rejection
   };
 
   void CountRejection(FilterState& f, PendingMeasurement& pending, UpdateMethod& method);

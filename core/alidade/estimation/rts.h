@@ -20,23 +20,28 @@ class SquareRootEquations;
 /// subtracts covariances nor inverts them. P may therefore be singular, and a vague prior costs few
 /// digits.
 ///
-/// The forward pass describes the state as x (+) D u with u ~ N(0, I), P = D D'. The array of each
-/// step and of each update is triangularised by an orthogonal matrix Q = [Q11 Q12; Q21 Q22]. The
-/// backward pass computes the distribution of u given all measurements, u ~ N(mu, A A'):
+/// The forward pass describes the state as x (+) D u with u ~ N(0, I), P = D D'. Each step and each
+/// update multiplies u and the noise by an orthogonal matrix Q, a product of reflections. The
+/// backward pass applies the same reflections in reverse order. It computes the distribution of u
+/// given all measurements, u ~ N(mu, A A'):
 ///
 ///   estimate   x_s = x (+) D mu,   P_s = (D A) (D A)'
 ///   start      mu = 0, A = I                                      at the last frame
-///   step       [u; w] = Q [u+; v]:   mu <- Q11 mu,                A A' <- [Q11 A, Q12] [...]'
-///   update     [n; u] = Q [Ls^-1 r; u+]:   mu <- Q21 Ls^-1 r + Q22 mu,   A <- Q22 A
+///   step       [u; w] = Q [u+; v]:   [mu A] <- rows of u in Q [mu+  A+  0]
+///                                                             [ 0   0   I]
+///   update     [n; u] = Q [y; u+]:   [mu A] <- rows of u in Q [ y   0 ],   y = Ls^-1 r
+///                                                             [mu+  A+]
 ///
 /// w and n are the noise of the step and of the measurement, u+ is u after the step or update, and
-/// v has no effect on the state after the step. A is triangularised again after each step. Discrete
-/// noise is a part of u during its interval, and D = [B M].
+/// v ~ N(0, I) has no effect on the state after the step. A is triangularised after each step.
+/// Discrete noise is a part of u during its interval, and D = [M B]. The complexity is O(n^3) for a
+/// step and for the estimate of a frame, and O(n^2 m) for an update.
 ///
 /// Jacobians, R and robust weights are those of the forward pass. If the forward pass recovers from
 /// rejections, later measurements do not change the estimates before the recovery.
 ///
-/// Source       [Rauch1965] the smoothed estimates; [Bierman1977] ch. V, X, the arrays.
+/// Source       [Rauch1965] the smoothed estimates; [Bierman1977] ch. V, X, the arrays and the
+///              reflections.
 class RtsSmoother : public Estimator {
  public:
   /// Does not support consider blocks or roles, blocks that start from a measurement, roles with

@@ -12,10 +12,10 @@ SquareRootEkf::SquareRootEkf(Problem problem, const EkfOptions& options,
     : Filter(CheckedProblem(std::move(problem), "SquareRootEkf", kCapabilities), options, streams,
              std::make_unique<internal::SquareRootEquations>()) {}
 
-const Eigen::MatrixXd& SquareRootEkf::root() const {
-  const Eigen::MatrixXd* const root = engine().method->Root();
-  ALIDADE_EXPECTS(root != nullptr);
-  return *root;
+Eigen::MatrixXd SquareRootEkf::root() const {
+  Eigen::MatrixXd root = engine().method->Root(engine().f);
+  ALIDADE_EXPECTS(root.rows() == engine().f.size());
+  return root;
 }
 
 }  // namespace alidade

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <memory>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "alidade/estimation/ekf_equations.h"
@@ -13,17 +11,22 @@
 
 namespace alidade::internal {
 
-/// Relation between the vector u before a step or an update and the vector u' after it:
+/// Relation between the vector u before a step or an update and the vector u' after it. Q is
+/// orthogonal, a product of reflections (reflections.h). A dot is a part that is not used.
 ///
-///   u = T u' + C v + c,   v ~ N(0, I)
+///   step     [.; u; .] = Q [u'; v],   v ~ N(0, I)
+///   update   [.; u] = Q [y; u'],      y = Ls^-1 r
 ///
 /// SquareRootEquations describe the state as x (+) D u, with u ~ N(0, I) and P = D D'. Each step
-/// and update multiplies u, together with the noise, by an orthogonal matrix. T and C are parts of
-/// this matrix. A measurement determines c.
+/// and update multiplies u, together with the noise, by Q.
 struct BackwardStep {
-  Eigen::MatrixXd transition;  ///< T
-  Eigen::MatrixXd noise;       ///< C; it has no columns if there is no noise v
-  Eigen::VectorXd offset;      ///< c
+  /// Column k contains reflection k. Update: of y_k and u'. Step: of the last elements of [u'; v],
+  /// one for each row of the matrix, but only of those from row k on.
+  Eigen::MatrixXd reflectors;
+  Eigen::VectorXd y;   ///< y; empty in a step
+  Eigen::Index noise;  ///< number of elements of v
+  Eigen::Index first;  ///< number of elements before u in [.; u; .]
+  Eigen::Index size;   ///< number of elements of u
 };
 
 /// Equations of the square-root filter, as documented at SquareRootEkf. Uses the Jacobians of
@@ -44,32 +47,21 @@ class SquareRootEquations : public UpdateMethod {
   double ComputeNis(FilterState& f, PendingMeasurement& pending) override;
   Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) override;
 
-  const Eigen::MatrixXd* Root() const override { return &root_; }
-  /// Returns D: the root L of P, or [B M] in an interval of discrete noise.
-  Eigen::MatrixXd Directions(const FilterState& f) const;
-  /// Returns the backward steps that were added since the last call.
-  std::vector<BackwardStep> ExtractBackwardSteps() { return std::exchange(backward_steps_, {}); }
+  Eigen::MatrixXd Root(const FilterState& f) const override;
+  const std::vector<BackwardStep>& backward_steps() const { return backward_steps_; }
 
  private:
   void SetCovariance(FilterState& f) const;
-  void RecordStep(FilterState& f, const Workspace::Matrix& reflectors,
-                  const Workspace::Vector& factors, bool continues_interval);
-  void RecordEndOfInterval(FilterState& f);
-  void Record(BackwardStep step);
-
-  /// Square root of R.
-  struct NoiseRoot {
-    Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt;
-    Eigen::MatrixXd root;
-  };
+  Workspace::Matrix TriangulariseRoot(FilterState& f, Workspace::Matrix& reflectors) const;
+  void Record(const ConstMatrix& reflectors, const Eigen::Ref<const Eigen::VectorXd>& y,
+              Eigen::Index noise, Eigen::Index first, Eigen::Index size);
 
   EkfEquations ekf_;
-  Eigen::MatrixXd root_;                ///< L
-  Eigen::MatrixXd conditional_root_;    ///< B; used in an interval of discrete noise
-  std::vector<NoiseRoot> noise_roots_;  ///< by sensor; reused memory
+  Eigen::MatrixXd root_;        ///< L, or B in an interval of discrete noise
+  bool is_triangular_ = false;  ///< whether root_ is lower triangular
   bool is_recording_;
   std::vector<BackwardStep> backward_steps_;
-  Eigen::Index variables_ = 0;  ///< size of u, if the steps are recorded
+  Eigen::Index variables_ = 0;  ///< size of u: that of w, if it is a part of u, plus that of x
 };
 
 }  // namespace alidade::internal

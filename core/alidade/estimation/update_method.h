@@ -16,8 +16,8 @@ class UpdateMethod {
   /// Returns a copy that shares no data with this object.
   virtual std::unique_ptr<UpdateMethod> Clone() const = 0;
 
-  /// Returns the square root of P if the method stores one, else null.
-  virtual const Eigen::MatrixXd* Root() const { return nullptr; }
+  /// Returns the square root D of P = D D' if the method stores one, else an empty matrix.
+  virtual Eigen::MatrixXd Root(const FilterState& /*f*/) const { return {}; }
   /// Called before the first frame with the initial x and P, and after a recovery changed x or P.
   virtual void Begin(FilterState& /*f*/) {}
   /// Propagates x and P by dt_s. If this fails, returns the error and leaves x and P unchanged.

@@ -237,22 +237,22 @@ void State::TransportCovariance(const std::vector<double>& values) {
   }
 }
 
-Workspace::Matrix TransportTo(const State& state, const std::vector<double>& values,
-                              Workspace& work) {
-  const int n = state.covariance().size();
-  Workspace::Matrix transport = work.Take(n, n);
-  transport.setIdentity();
+void TransportRows(const State& state, const std::vector<double>& values,
+                   Eigen::Ref<Eigen::MatrixXd> a) {
   for (const Block& block : state.layout().blocks()) {
     if (!block.has_covariance() || !block.geometry().has_transport()) continue;
     const int size = block.geometry().tangent;
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, detail::kMaxTangent,
                   detail::kMaxTangent>
         j(size, size);
+    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, detail::kMaxTangent> moved(size);
     block.geometry().Transport(state.values().data() + block.value_offset,
                                values.data() + block.value_offset, j.data());
-    transport.block(block.tangent_offset, block.tangent_offset, size, size) = j;
+    for (Eigen::Index column = 0; column < a.cols(); ++column) {
+      moved = j.lazyProduct(a.col(column).segment(block.tangent_offset, size));
+      a.col(column).segment(block.tangent_offset, size) = moved;
+    }
   }
-  return transport;
 }
 
 }  // namespace alidade

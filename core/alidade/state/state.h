@@ -139,9 +139,9 @@ class State {
   Scratch<std::vector<int>> columns_;
 };
 
-/// Returns the Jacobian J of state.MoveTo(values), n x n, in `work`. An error dx before the move
-/// becomes J dx after the move.
-Workspace::Matrix TransportTo(const State& state, const std::vector<double>& values,
-                              Workspace& work);
+/// Computes A <- J A with the Jacobian J of state.MoveTo(values). An error dx before the move
+/// becomes J dx after the move. A has n rows.
+void TransportRows(const State& state, const std::vector<double>& values,
+                   Eigen::Ref<Eigen::MatrixXd> a);
 
 }  // namespace alidade

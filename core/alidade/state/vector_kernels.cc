@@ -363,6 +363,32 @@ struct Loops {
     }
     return true;
   }
+
+  [[gnu::always_inline]] static void Reflect(long rows, long columns, const double* v, double* p,
+                                             double* a, long lda) {
+    constexpr int kHeight = 8 / kLanes;
+    for (long i = 0; i < rows; i += 8) {
+      Vector sum[kHeight];
+#pragma GCC unroll 8
+      for (int h = 0; h < kHeight; ++h) sum[h] = v[0] * Load(p + i + h * kLanes);
+      for (long j = 0; j < columns; ++j) {
+#pragma GCC unroll 8
+        for (int h = 0; h < kHeight; ++h) sum[h] += v[j + 1] * Load(a + i + j * lda + h * kLanes);
+      }
+#pragma GCC unroll 8
+      for (int h = 0; h < kHeight; ++h) {
+        double* const element = p + i + h * kLanes;
+        Store(element, Load(element) - v[0] * sum[h]);
+      }
+      for (long j = 0; j < columns; ++j) {
+#pragma GCC unroll 8
+        for (int h = 0; h < kHeight; ++h) {
+          double* const element = a + i + j * lda + h * kLanes;
+          Store(element, Load(element) - v[j + 1] * sum[h]);
+        }
+      }
+    }
+  }
 };
 
 /// Defines the class `kernels`, which contains the loops compiled for one instruction set. `target`
@@ -381,7 +407,11 @@ struct Loops {
     target static bool Factorise(long m, double* s, long lds) {                                    \
       return loops::Factorise(m, s, lds);                                                          \
     }                                                                                              \
-    static constexpr VectorKernels kTable{AddProduct, DivideByTransposed, Factorise};              \
+    target static void Reflect(long rows, long columns, const double* v, double* p, double* a,     \
+                               long lda) {                                                         \
+      loops::Reflect(rows, columns, v, p, a, lda);                                                 \
+    }                                                                                              \
+    static constexpr VectorKernels kTable{AddProduct, DivideByTransposed, Factorise, Reflect};     \
   }
 
 using BaselineLoops = Loops<2, 2, 4>;

@@ -26,6 +26,9 @@ struct VectorKernels {
   /// Replaces the lower triangle of a symmetric S = L L' by L. S is m x m and column-major. Returns
   /// false unless S is finite and positive definite.
   bool (*factorise)(long m, double* s, long lds);
+  /// Computes [p A] <- [p A] (I - v v'). p is a column. A is rows x columns and column-major. v has
+  /// columns + 1 elements. `rows` is a multiple of 8.
+  void (*reflect)(long rows, long columns, const double* v, double* p, double* a, long lda);
 };
 
 /// Returns the kernels of an instruction set.

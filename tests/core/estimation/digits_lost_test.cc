@@ -18,7 +18,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-constexpr double kSigma = 1e-3;
+constexpr double kSensorSigma = 1e-3;
 constexpr int kSums = 40, kDirect = 30;
 
 /// Returns a problem of two constants with vague priors. Their sum and the first one are measured.
@@ -26,8 +26,8 @@ Problem TwoConstants(double prior) {
   Problem problem;
   AddMotion(problem, "a", testing::ConstantMotion(1), {{"x", 0.0, prior}});
   AddMotion(problem, "b", testing::ConstantMotion(1), {{"x", 0.0, prior}});
-  AddSensor(problem, "sum", SumSensor(1.0, 1.0, kSigma), {"a.x", "b.x"});
-  AddSensor(problem, "direct", LinearSensor(1.0, kSigma), {"a.x"});
+  AddSensor(problem, "sum", SumSensor(1.0, 1.0, kSensorSigma), {"a.x", "b.x"});
+  AddSensor(problem, "direct", LinearSensor(1.0, kSensorSigma), {"a.x"});
   return problem;
 }
 
@@ -50,7 +50,8 @@ Outcomes Process(Estimator& estimator) {
   }
   const double a = 1.0 / kDirect, b = a + 1.0 / kSums;
   for (const auto& [name, exact] : {std::pair{"a.x", a}, std::pair{"b.x", b}}) {
-    const double found = CovarianceOf(estimator.state(), name, name) / (kSigma * kSigma);
+    const double found =
+        CovarianceOf(estimator.state(), name, name) / (kSensorSigma * kSensorSigma);
     outcomes.error = std::max(outcomes.error, std::abs(std::sqrt(found / exact) - 1.0));
   }
   return outcomes;
@@ -98,15 +99,39 @@ TEST(DigitsLost, AFilterThatStoresARootIsRightAndNotMarked) {
   }
 }
 
+// All data determine the constants equally in every frame. The exact variances are those of the
+// inverse of the information matrix, without differences of large numbers. L has an error of a few
+// units in the last digit of its largest element, so the relative error of a sigma is proportional
+// to the ratio of the sigmas of prior and measurement: 1e-6 for a ratio of 1e9.
+TEST(DigitsLost, TheSmootherIsRightInEveryFrame) {
+  constexpr double kWeight = 1.0 / (kSensorSigma * kSensorSigma), kSum = kSums * kWeight,
+                   kFirst = kDirect * kWeight;
+  for (double ratio = 1e2; ratio < 2e9; ratio *= 10.0) {
+    const double prior = ratio * kSensorSigma, given = 1.0 / (prior * prior),
+                 tolerance = 1e-15 * ratio;
+    const Problem problem = TwoConstants(prior);
+    RtsSmoother smoother(problem, {}, StreamsOf(problem));
+    Process(smoother);
+    const double determinant = given * (given + 2.0 * kSum + kFirst) + kSum * kFirst;
+    const double a = (given + kSum) / determinant, b = (given + kSum + kFirst) / determinant;
+    smoother.Smooth([&](std::size_t k, const State& state, const UpdateReport&) {
+      const double found_a = CovarianceOf(state, "a.x", "a.x");
+      const double found_b = CovarianceOf(state, "b.x", "b.x");
+      EXPECT_NEAR(std::sqrt(found_a / a), 1.0, tolerance) << ratio << ' ' << k;
+      EXPECT_NEAR(std::sqrt(found_b / b), 1.0, tolerance) << ratio << ' ' << k;
+    });
+  }
+}
+
 // The Joseph form keeps the digits of a variance that one direct measurement reduces.
 TEST(DigitsLost, ADirectMeasurementIsNotMarked) {
   Problem problem;
   AddMotion(problem, "a", testing::ConstantMotion(1), {{"x", 0.0, 1e9}});
-  AddSensor(problem, "direct", LinearSensor(1.0, kSigma), {"a.x"});
+  AddSensor(problem, "direct", LinearSensor(1.0, kSensorSigma), {"a.x"});
   for (const std::unique_ptr<Estimator>& filter : FiltersThatStoreP(problem)) {
     const UpdateReport& report = filter->Process(FrameAt(0.0, {{0, 1.0}}));
     EXPECT_FALSE(HasEvent(report, EventKind::kDigitsLost));
-    EXPECT_NEAR(std::sqrt(CovarianceOf(filter->state(), "a.x", "a.x")) / kSigma, 1.0, 1e-3);
+    EXPECT_NEAR(std::sqrt(CovarianceOf(filter->state(), "a.x", "a.x")) / kSensorSigma, 1.0, 1e-3);
   }
 }
 
@@ -115,8 +140,8 @@ TEST(DigitsLost, ADirectMeasurementIsNotMarked) {
 TEST(DigitsLost, APivotThatAJointUpdateLosesIsMarked) {
   Problem problem;
   AddMotion(problem, "a", testing::ConstantMotion(1), {{"x", 0.0, 1e4}});
-  AddSensor(problem, "first", LinearSensor(1.0, kSigma), {"a.x"});
-  AddSensor(problem, "second", LinearSensor(1.0, kSigma), {"a.x"});
+  AddSensor(problem, "first", LinearSensor(1.0, kSensorSigma), {"a.x"});
+  AddSensor(problem, "second", LinearSensor(1.0, kSensorSigma), {"a.x"});
   EkfOptions options;
   options.fuse = Fuse::kJoint;
   Ekf joint(problem, options, StreamsOf(problem));

@@ -59,8 +59,13 @@ std::string UsageErrorText(const CLI::App& command, const CLI::ParseError& error
     if (needs_command) return "a command is missing";
     return OptionText(command, text.substr(0, text.find(" is required")), " is missing");
   }
-  if (extra.empty() && dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr)
-    return OptionText(command, text.substr(0, text.find(':')), " needs a value");
+  if (extra.empty() && dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
+    const std::string name = text.substr(0, text.find(':'));
+    const CLI::Option* const option = command.get_option_no_throw(name);
+    const bool is_repeated =
+        option != nullptr && option->get_expected_max() == 1 && option->count() > 1;
+    return OptionText(command, name, is_repeated ? " is given more than once" : " needs a value");
+  }
   if (extra.empty()) return text;
   const std::string& word = extra.front();
   const char* const problem = word.starts_with('-') ? "unknown option '"

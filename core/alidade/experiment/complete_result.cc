@@ -69,16 +69,19 @@ void AddGapEvent(const Metrics& metrics, EstimatorResult& result) {
 }
 
 /// Adds the findings about the innovations, and the verdict.
-void AddVerdict(const Metrics& metrics, EstimatorResult& result) {
+void AddVerdict(const Metrics& metrics, std::string_view run_failure, EstimatorResult& result) {
   result.findings = Diagnose(metrics.innovations());
   const std::vector<NeesSeries> nees = metrics.nees();
   VerdictFacts facts{.failed = result.failed && !result.diverged,
                      .diverged = result.diverged,
+                     .run_failure = run_failure,
                      .events = result.events,
                      .sensors = metrics.uses(),
                      .nees = nees,
                      .findings = result.findings};
-  for (const InnovationSeries& series : metrics.innovations()) facts.innovations += series.size();
+  for (const InnovationSeries& series : metrics.innovations()) {
+    facts.tested_sensors += IsScaleTested(series) ? 1 : 0;
+  }
   result.verdict = ComputeVerdict(facts);
 }
 
@@ -122,7 +125,7 @@ void AddUnusedEvents(const Problem& problem, EstimatorResult& result) {
 
 }  // namespace
 
-void CompleteResult(const Experiment& experiment, EstimatorRun& run) {
+void CompleteResult(const Experiment& experiment, EstimatorRun& run, std::string_view run_failure) {
   EstimatorResult& result = run.result;
   const Problem& problem = run.spec.problem;
   const Estimator& estimator = *run.spec.estimator;
@@ -142,7 +145,7 @@ void CompleteResult(const Experiment& experiment, EstimatorRun& run) {
   run.AddEvents(run.metrics.events());
   result.diverged = run.diverged || (estimator.offline() && estimator.diverged());
   result.failed = run.finished || run.diverged || estimator.failed() || estimator.diverged();
-  AddVerdict(run.metrics, result);
+  AddVerdict(run.metrics, run_failure, result);
 }
 
 }  // namespace alidade::internal

@@ -13,9 +13,9 @@ using internal::InnovationView;
 
 using Rule = internal::MaybeFinding (*)(const InnovationView& view);
 
-constexpr Rule kGrossErrorRules[] = {internal::TestTimeUnit,   internal::TestUnit,
-                                     internal::TestPrior,      internal::TestDomain,
-                                     internal::TestRejections, internal::TestSwap};
+constexpr Rule kGrossErrorRules[] = {
+    internal::TestTimeUnit,   internal::TestUnit, internal::TestPrior, internal::TestDomain,
+    internal::TestRejections, internal::TestSwap, internal::TestStuck};
 constexpr Rule kNoiseRules[] = {internal::TestNoiseModel, internal::TestTails,
                                 internal::TestElements,   internal::TestTimeOffset,
                                 internal::TestBias,       internal::TestCorrelation,

@@ -19,6 +19,7 @@ enum class FindingKind {
   kOutOfDomain,
   kRejected,
   kSwapped,
+  kStuck,
   kTimeOffset,
   kHeteroscedastic,
   kHeavyTails,
@@ -52,8 +53,11 @@ inline constexpr std::array kFindingKinds = {
                     "most measurements of the sensor were rejected, or many in a row"},
     FindingKindInfo{FindingKind::kSwapped, "swapped",
                     "two elements of the measurement appear to be exchanged"},
+    FindingKindInfo{FindingKind::kStuck, "stuck",
+                    "the same measurement was repeated many times in a row"},
     FindingKindInfo{FindingKind::kTimeOffset, "time_offset",
-                    "innovations are proportional to the predicted rate: the clock is off"},
+                    "innovations are proportional to the predicted rate: the clock of this or of "
+                    "another sensor is off"},
     FindingKindInfo{FindingKind::kHeteroscedastic, "heteroscedastic",
                     "the noise depends on the measured quantity in another way than in the model"},
     FindingKindInfo{FindingKind::kHeavyTails, "heavy_tails", "there are outliers"},
@@ -97,6 +101,11 @@ struct Finding {
 /// Source       [BarShalom2001] sec. 5.4.
 std::vector<Finding> Diagnose(std::span<const InnovationSeries> sensors);
 inline constexpr int kMinDiagnosedFrames = 30;
+
+/// Returns whether Diagnose tests the size of the innovations of a sensor.
+inline bool IsScaleTested(const InnovationSeries& series) {
+  return !series.has_robust_loss && series.accepted_frames() >= kMinDiagnosedFrames;
+}
 
 /// Returns the name of a kind in files.
 inline const char* ToString(FindingKind kind) {

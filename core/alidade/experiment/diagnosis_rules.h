@@ -8,7 +8,7 @@
 #include "alidade/experiment/innovation_view.h"
 
 /// Rules of Diagnose. Each rule tests the innovations of one sensor, and returns its finding or
-/// nullopt. Diagnosis.cc lists the rules.
+/// nullopt. diagnosis.cc lists the rules.
 namespace alidade::internal {
 
 using MaybeFinding = std::optional<Finding>;
@@ -20,6 +20,15 @@ inline Finding MakeFinding(FindingKind kind, const InnovationView& view, double 
   return {kind, sensor, sensor + ": " + text, statistic};
 }
 
+/// Returns `element K: `, or "" for a measurement of one element.
+inline std::string ElementPrefix(const InnovationView& view, std::size_t k) {
+  return view.dof() == 1 ? "" : "element " + std::to_string(k) + ": ";
+}
+
+/// Returns ` (near the factor between mm and m, ...)` if the ratio is near the factor between two
+/// units, otherwise "".
+std::string UnitHint(double ratio);
+
 // Errors that exceed the noise by far. These rules need only a few measurements.
 MaybeFinding TestTimeUnit(const InnovationView& view);
 MaybeFinding TestUnit(const InnovationView& view);
@@ -27,6 +36,7 @@ MaybeFinding TestPrior(const InnovationView& view);
 MaybeFinding TestDomain(const InnovationView& view);
 MaybeFinding TestRejections(const InnovationView& view);
 MaybeFinding TestSwap(const InnovationView& view);
+MaybeFinding TestStuck(const InnovationView& view);
 
 // Errors of the size of the noise. These rules need kMinDiagnosedFrames frames.
 MaybeFinding TestNoiseModel(const InnovationView& view);

@@ -20,7 +20,7 @@ namespace alidade {
 
 class Filter;
 
-/// Reaction of the run to Estimator::diverged(). The event `inconsistent` of the metrics, which
+/// Reaction of the run to Estimator::diverged(). The event `lost` of the metrics, which
 /// needs truth, never ends a run.
 enum class OnDivergence { kReport, kFail };
 

@@ -12,8 +12,6 @@
 namespace alidade::internal {
 namespace {
 
-constexpr std::size_t kFirstFrames = 3;
-
 /// Factor between two units that are easily confused.
 struct UnitFactor {
   double factor;
@@ -48,14 +46,10 @@ const UnitFactor* NearestFactor(double ratio, bool with_small) {
   return nearest;
 }
 
-std::string ElementOf(const InnovationView& view, std::size_t k) {
-  return view.dof() == 1 ? "" : "element " + std::to_string(k) + " of ";
-}
-
 MaybeFinding UnitFinding(const InnovationView& view, std::size_t k, double ratio,
                          const std::string& measurement, const std::string& meaning) {
   return MakeFinding(FindingKind::kUnit, view, ratio,
-                     ElementOf(view, k) + measurement + " is " + RoundedText(ratio, 3) +
+                     ElementPrefix(view, k) + measurement + " is " + RoundedText(ratio, 3) +
                          " times its prediction, which is " + meaning +
                          "; check the unit of the data, of the prior and of the parameters");
 }
@@ -108,7 +102,10 @@ MaybeFinding TestMedianRatio(const InnovationView& view) {
     if (!(spread < kLargeSpread)) continue;
     if (median < 0.0) {
       if (spread > kSmallSpread || std::abs(median + 1.0) > kSmallSpread) continue;
-      return UnitFinding(view, k, median, "the measurement", "the opposite sign");
+      return MakeFinding(FindingKind::kUnit, view, median,
+                         ElementPrefix(view, k) +
+                             "the measurement is -1 times its prediction; check the sign and the "
+                             "direction of the axis");
     }
     if (const UnitFactor* const unit = NearestFactor(median, spread < kSmallSpread)) {
       return UnitFinding(view, k, median, "the measurement", unit->meaning);
@@ -197,18 +194,26 @@ SwapEffect MedianEffectOfSwap(const InnovationView& view, std::size_t a, std::si
 
 }  // namespace
 
+std::string UnitHint(double ratio) {
+  const UnitFactor* const unit = NearestFactor(ratio, false);
+  return unit ? std::string(" (near ") + unit->meaning + ')' : "";
+}
+
 MaybeFinding TestTimeUnit(const InnovationView& view) {
-  constexpr double kLongStep_s = 10.0;
+  constexpr double kLongStep_s = 10.0, kFarRatio = 20.0;
   const InnovationSeries& series = view.series();
   if (series.frames < 2) return {};
   const double step_s =
       (Seconds(series.last) - Seconds(series.first)) / (static_cast<double>(series.frames) - 1.0);
   if (!(step_s > kLongStep_s)) return {};
-  if (!TestPrior(view) && !TestDomain(view) && !TestRejections(view)) return {};
+  const double ratio = view.median_ratio();
+  const bool is_far = ratio > kFarRatio || ratio < 1.0 / kFarRatio || TestPrior(view) ||
+                      TestDomain(view) || TestRejections(view);
+  if (!is_far) return {};
   return MakeFinding(FindingKind::kTimeUnit, view, step_s,
                      "the mean time step is " + RoundedText(step_s, 3) +
-                         " s, and the measurements are far from their predictions: the times may "
-                         "be in ms; convert them to s");
+                         " s, and the innovations are not as predicted: the times may be in ms; "
+                         "convert them to s");
 }
 
 MaybeFinding TestUnit(const InnovationView& view) {
@@ -223,14 +228,16 @@ MaybeFinding TestUnit(const InnovationView& view) {
 }
 
 MaybeFinding TestPrior(const InnovationView& view) {
-  constexpr double kFalseAlarm = 1e-6;
+  constexpr double kFalseAlarm = 1e-6, kMaxRatio = 16.0;
   double count = 0.0, largest = 0.0;
   for (std::size_t i = 0; i < view.size() && view.frame(i) < kFirstFrames; ++i, ++count) {
     largest = std::max(largest, view.nis(i));
   }
   if (count == 0.0) return {};
   const int dof = view.series().dof;
-  if (!(largest > ChiSquareQuantile(1.0 - kFalseAlarm / count, dof))) return {};
+  // If all innovations are too large, the first ones are not due to the prior.
+  const double ratio = std::clamp(view.median_ratio(), 1.0, kMaxRatio);
+  if (!(largest > ratio * ChiSquareQuantile(1.0 - kFalseAlarm / count, dof))) return {};
   return MakeFinding(FindingKind::kPriorFar, view, largest,
                      "one of the first measurements is " +
                          RoundedText(std::sqrt(largest / dof), 3) +
@@ -253,19 +260,18 @@ MaybeFinding TestDomain(const InnovationView& view) {
 
 MaybeFinding TestRejections(const InnovationView& view) {
   constexpr std::size_t kMinRows = 5, kMaxInARow = 10;
-  constexpr const char* kRemedy = "; check the prior, the units and the noise";
+  constexpr const char* kRemedy =
+      "; check the prior, the units, the noise of the sensor and the process noise";
   const double share = view.rejected_share();
   if (IsMostlyRejected(view) && view.size() >= kMinRows) {
-    return MakeFinding(FindingKind::kRejected, view, share,
-                       RoundedText(100.0 * share, 3) +
-                           " % of the measurements were rejected, so "
-                           "the estimate hardly depends on this sensor" +
-                           kRemedy);
+    return MakeFinding(
+        FindingKind::kRejected, view, share,
+        RoundedText(100.0 * share, 3) + " % of the measurements were rejected" + kRemedy);
   }
   const std::size_t longest = LongestRejection(view);
   if (longest < kMaxInARow) return {};
   return MakeFinding(FindingKind::kRejected, view, static_cast<double>(longest),
-                     "the measurements of " + std::to_string(longest) +
+                     "most measurements of " + std::to_string(longest) +
                          " consecutive timestamps were rejected" + kRemedy);
 }
 
@@ -285,6 +291,29 @@ MaybeFinding TestSwap(const InnovationView& view) {
     }
   }
   return {};
+}
+
+MaybeFinding TestStuck(const InnovationView& view) {
+  constexpr std::size_t kMinRepetitions = 20;
+  const std::vector<double>& z = view.series().z;
+  const auto size = static_cast<std::ptrdiff_t>(view.size() == 0 ? 0 : z.size() / view.size());
+  std::size_t longest = 0, current = 0;
+  double since_s = 0.0;
+  for (std::size_t i = 1; i < view.size(); ++i) {
+    const auto row = z.begin() + static_cast<std::ptrdiff_t>(i) * size;
+    const bool is_same = view.series().landmarks[i] < 0 && std::equal(row, row + size, row - size);
+    current = is_same ? current + 1 : 0;
+    if (current <= longest) continue;
+    longest = current;
+    since_s = view.time_s(i - current);
+  }
+  // A sensor that always measures the same, such as zero velocity, is not stuck.
+  if (longest < kMinRepetitions || longest + 1 == view.size()) return {};
+  return MakeFinding(FindingKind::kStuck, view, static_cast<double>(longest),
+                     "the measurement at " + RoundedText(since_s, 6) + " s was repeated " +
+                         std::to_string(longest) +
+                         " times without a change: the sensor is stuck, or its resolution is "
+                         "coarser than its noise; leave out these measurements");
 }
 
 }  // namespace alidade::internal

@@ -52,11 +52,6 @@ struct InnovationSeries {
   std::size_t size() const { return timestamps.size(); }
   /// Returns the number of different timestamps of accepted measurements.
   std::int64_t accepted_frames() const;
-  /// Returns row i of an array with one row of `columns` numbers for each measurement.
-  static std::span<const double> Row(const std::vector<double>& rows, std::size_t i, int columns) {
-    const auto width = static_cast<std::size_t>(columns);
-    return std::span(rows).subspan(i * width, width);
-  }
 };
 
 }  // namespace alidade

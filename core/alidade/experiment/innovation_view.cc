@@ -11,6 +11,9 @@
 namespace alidade::internal {
 namespace {
 
+/// Largest share of rejections that may be due to chance.
+constexpr double kChanceShare = 0.05;
+
 Eigen::VectorXd Centred(std::span<const double> values) {
   const Eigen::VectorXd x = Eigen::VectorXd::Map(values.data(), std::ssize(values));
   return x.array() - x.mean();
@@ -19,13 +22,13 @@ Eigen::VectorXd Centred(std::span<const double> values) {
 }  // namespace
 
 InnovationView::InnovationView(const InnovationSeries& series) : series_(&series) {
-  constexpr double kChanceShare = 0.05;
   for (std::size_t i = 0; i < size(); ++i) {
     const bool is_new = i > 0 && series.timestamps[i] != series.timestamps[i - 1];
     frames_.push_back(i == 0 ? 0 : frames_.back() + (is_new ? 1 : 0));
     if (!is_accepted(i)) rejected_.push_back(i);
   }
   for (std::size_t i = 0; i < size(); ++i) {
+    if (frame(i) < kFirstFrames) continue;
     if (is_accepted(i) || rejected_share() >= kChanceShare) tested_.push_back(i);
   }
   if (size() > 0) FindOutliers();
@@ -42,17 +45,23 @@ double InnovationView::rejected_share() const {
 /// Compares the number of frames with an outlier with a Poisson distribution. The probability of k
 /// or more frames, of which f are expected, is P(chi2(2 k) <= 2 f).
 void InnovationView::FindOutliers() {
-  constexpr double kTail = 1e-4, kFalseAlarm = 1e-6, kMinShare = 0.004;
+  constexpr double kTail = 1e-4, kFalseAlarm = 1e-6, kMinShare = 0.004, kMaxNormal = 2.4;
   constexpr std::size_t kMinFrames = 3;
-  const double median_ratio = Median(series_->nis) / ChiSquareQuantile(0.5, series_->dof);
+  std::vector<double> nis_values = series_->nis;
+  std::ranges::sort(nis_values);
+  const double median = ChiSquareQuantile(0.5, series_->dof);
+  median_ratio_ = Quantile(nis_values, 0.5) / median;
+  // The rank of the median is uncertain by sqrt(n) / 2.
+  const double upper =
+      std::min(1.0, 0.5 + 0.5 * kMaxNormal / std::sqrt(static_cast<double>(size())));
   outlier_nis_ = ChiSquareQuantile(1.0 - kTail, series_->dof) *
-                 std::max(median_ratio, std::numeric_limits<double>::min());
+                 std::max(Quantile(nis_values, upper) / median, std::numeric_limits<double>::min());
   Rows outliers;
   for (std::size_t i = 0; i < size(); ++i) {
     if (nis(i) > outlier_nis_) outliers.push_back(i);
   }
   outlier_share_ = static_cast<double>(outliers.size()) / static_cast<double>(size());
-  const std::size_t count = SumFrames(*this, outliers, [](std::size_t) { return 1.0; }).size();
+  const std::size_t count = CountFrames(*this, outliers);
   if (count < kMinFrames || outlier_share_ <= kMinShare) return;
   const auto frames = static_cast<double>(frame_count());
   const double per_frame = static_cast<double>(size()) / frames;
@@ -61,7 +70,7 @@ void InnovationView::FindOutliers() {
 }
 
 double InnovationView::expected_nis() const {
-  if (rejected_.empty() || tested_.size() == size()) return 1.0;
+  if (rejected_.empty() || rejected_share() >= kChanceShare) return 1.0;
   double largest_accepted = 0.0, smallest_rejected = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < size(); ++i) {
     if (is_accepted(i)) {
@@ -90,21 +99,6 @@ double LagOneCorrelation(std::span<const double> values) {
   const Eigen::Index n = x.size();
   const double square = x.squaredNorm();
   return square > 0.0 ? x.head(n - 1).dot(x.tail(n - 1)) / square : 0.0;
-}
-
-double CorrelationTime(std::span<const double> values) {
-  constexpr Eigen::Index kMinSize = 8, kMaxLag = 200;
-  const Eigen::VectorXd x = Centred(values);
-  const Eigen::Index n = x.size();
-  const double square = x.squaredNorm(), noise = 2.0 / std::sqrt(static_cast<double>(n));
-  double tau = 1.0;
-  if (n < kMinSize || !(square > 0.0)) return tau;
-  for (Eigen::Index k = 1; k < std::min(n / 3, kMaxLag); ++k) {
-    const double rho = x.head(n - k).dot(x.tail(n - k)) / square;
-    if (!(rho >= noise)) break;
-    tau += 2.0 * rho;
-  }
-  return tau;
 }
 
 }  // namespace alidade::internal

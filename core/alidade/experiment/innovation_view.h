@@ -12,6 +12,9 @@
 /// measurements.
 namespace alidade::internal {
 
+/// Number of frames that depend on the prior more than on the noise.
+inline constexpr std::size_t kFirstFrames = 3;
+
 /// Indices of measurements, in ascending order.
 using Rows = std::vector<std::size_t>;
 
@@ -54,23 +57,23 @@ class InnovationView {
   /// Rejected measurements, and their share.
   const Rows& rejected() const { return rejected_; }
   double rejected_share() const;
-  /// Measurements of the statistical tests. If at least 5 % were rejected, rejections are not due
-  /// to chance; the tests then use the rejected measurements too.
+  /// Measurements of the statistical tests, without the first frames. If at least 5 % were
+  /// rejected, rejections are not due to chance; the tests then use the rejected measurements too.
   const Rows& tested() const { return tested_; }
   /// Tested measurements without outliers.
   const Rows& core() const { return core_; }
 
-  /// Threshold of an outlier: the NIS that a Gaussian innovation exceeds with probability 1e-4,
-  /// scaled by the median NIS.
-  double outlier_nis() const { return outlier_nis_; }
-  /// Returns the share of measurements beyond this threshold.
+  /// Returns the median of NIS, divided by that of a consistent filter.
+  double median_ratio() const { return median_ratio_; }
+  /// Returns the share of outliers. The NIS of an outlier exceeds a threshold that a Gaussian
+  /// innovation exceeds with probability 1e-4, scaled by an upper bound of the median ratio.
   double outlier_share() const { return outlier_share_; }
   /// Returns whether there are more outliers than chance explains.
   bool has_outliers() const { return has_outliers_; }
 
-  /// Returns the mean of NIS / dof of a consistent filter over the core. It is below 1 if the gate
-  /// truncates the distribution. The threshold of the gate is unknown; it is between the largest
-  /// accepted and the smallest rejected NIS.
+  /// Returns the mean of NIS / dof of a consistent filter over the accepted measurements. It is
+  /// below 1 if the gate truncates the distribution. The threshold of the gate is unknown; the
+  /// larger of the largest accepted and the smallest rejected NIS is used.
   double expected_nis() const;
 
  private:
@@ -81,7 +84,7 @@ class InnovationView {
   const InnovationSeries* series_;
   std::vector<std::size_t> frames_;
   Rows rejected_, tested_, core_;
-  double outlier_nis_ = 0.0, outlier_share_ = 0.0;
+  double median_ratio_ = 1.0, outlier_nis_ = 0.0, outlier_share_ = 0.0;
   bool has_outliers_ = false;
 };
 
@@ -95,6 +98,11 @@ std::vector<FrameSum> SumFrames(const InnovationView& view, const Rows& rows, co
     ++frames.back().count;
   }
   return frames;
+}
+
+/// Returns the number of frames with at least one of the rows.
+inline std::size_t CountFrames(const InnovationView& view, const Rows& rows) {
+  return SumFrames(view, rows, [](std::size_t) { return 0.0; }).size();
 }
 
 /// Returns the mean of value(i) over the rows of each frame. Omits frames without a row.
@@ -112,8 +120,5 @@ double Mean(std::span<const double> values);
 double SquaredDeviation(std::span<const double> values);
 /// Returns the autocorrelation at a delay of one value.
 double LagOneCorrelation(std::span<const double> values);
-/// Returns the integrated autocorrelation time of a series about its mean, at least 1. The sum
-/// 1 + 2 sum rho(k) ends before the first rho(k) < 2 / sqrt(n), at n / 3 or at k = 200.
-double CorrelationTime(std::span<const double> values);
 
 }  // namespace alidade::internal

@@ -338,13 +338,13 @@ std::string ReferenceText(const RunResult& result) {
 
 namespace {
 
-/// Returns at most three findings, a line each, without the finding that the verdict states.
+/// Returns at most three findings, a line each, without those that the verdict states.
 std::string FindingLines(const EstimatorResult& estimator, const std::string& indent) {
   constexpr std::size_t kMaxShown = 3;
   std::string text;
   std::size_t count = 0;
   for (const Finding& finding : estimator.findings) {
-    if (finding.text == estimator.verdict.because) continue;
+    if (estimator.verdict.because.find(finding.text) != std::string::npos) continue;
     if (++count <= kMaxShown) text += indent + finding.text + '\n';
   }
   if (count < 2) return text;
@@ -387,8 +387,8 @@ std::string VerdictText(const RunResult& result) {
   for (const EstimatorResult& estimator : result.estimators) {
     const Verdict& verdict = estimator.verdict;
     const std::string indent(width + 2, ' ');
-    text += estimator.name + indent.substr(estimator.name.size()) + ToString(verdict.state) + ": " +
-            verdict.because + '\n';
+    text += estimator.name + indent.substr(estimator.name.size()) + ToString(verdict.state) +
+            (estimator.expects_poor ? " (poor is expected): " : ": ") + verdict.because + '\n';
     const EstimatorResult* const same = WithSameFindings(result, estimator);
     text += same ? indent + "the same findings as for " + same->name + '\n'
                  : FindingLines(estimator, indent);

@@ -8,6 +8,7 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/statistics.h"
 #include "alidade/experiment/diagnosis_rules.h"
+#include "alidade/experiment/time_series.h"
 
 namespace alidade::internal {
 namespace {
@@ -34,10 +35,6 @@ ElementStatistic Largest(const InnovationView& view, const Statistic& statistic)
   return largest;
 }
 
-std::string ElementPrefix(const InnovationView& view, std::size_t k) {
-  return view.dof() == 1 ? "" : "element " + std::to_string(k) + ": ";
-}
-
 /// Returns sum u_k / sqrt(n) of the n tested measurements of each frame.
 std::vector<double> FrameInnovations(const InnovationView& view, std::size_t k) {
   std::vector<double> series;
@@ -48,14 +45,27 @@ std::vector<double> FrameInnovations(const InnovationView& view, std::size_t k) 
   return series;
 }
 
+/// Returns the autocorrelation time of a series about its mean.
+double CorrelationTime(const std::vector<double>& series) {
+  return AutocorrelationTime(series, Mean(series));
+}
+
+/// Returns the normal value with about the same probability as the value t of Student's
+/// distribution with n - 1 degrees of freedom.
+double NormalOfStudent(double t, double n) {
+  const double dof = std::max(n - 1.0, 1.0);
+  return t * (1.0 - 0.25 / dof) / std::sqrt(1.0 + 0.5 * t * t / dof);
+}
+
 /// Mean of the innovation, in sigma. The uncertainty of the mean allows for correlation in time.
 ElementStatistic BiasOf(const InnovationView& view, std::size_t k) {
   const std::vector<double> series = FrameInnovations(view, k);
   const auto n = static_cast<double>(series.size());
-  const double variance = SquaredDeviation(series) / (n - 1.0);
+  const double variance = std::max(SquaredDeviation(series) / (n - 1.0), 1e-24);
+  const double independent = n / CorrelationTime(series);
   double mean = 0.0;
   for (const std::size_t i : view.tested()) mean += view.u(i, k);
-  return {Mean(series) / std::sqrt(std::max(variance, 1e-24) * CorrelationTime(series) / n),
+  return {NormalOfStudent(Mean(series) / std::sqrt(variance / independent), independent),
           mean / static_cast<double>(view.tested().size())};
 }
 
@@ -65,11 +75,48 @@ ElementStatistic CorrelationOf(const InnovationView& view, std::size_t k) {
   return {rho * std::sqrt(static_cast<double>(series.size())), rho};
 }
 
+/// Regression line of y against x by least squares.
+struct Line {
+  double slope = 0.0;
+  double normal = 0.0;    ///< slope divided by its standard deviation
+  double x_spread = 0.0;  ///< standard deviation of x
+};
+
+/// Computes the line of y against x. Row i of the view belongs to x_i and y_i. The variance of the
+/// slope allows for dependence in a frame, because its innovations depend on the same prediction,
+/// and in time. Returns the slope 0 if x is constant.
+Line FitLine(const InnovationView& view, const Rows& rows, const std::vector<double>& x,
+             const std::vector<double>& y) {
+  const double mean_x = Mean(x), mean_y = Mean(y), square = SquaredDeviation(x);
+  if (!(square > 1e-12 * (square + mean_x * mean_x))) return {};
+  double product = 0.0;
+  for (std::size_t j = 0; j < x.size(); ++j) product += (x[j] - mean_x) * (y[j] - mean_y);
+  const double slope = product / square;
+  std::vector<double> scores;  // sums over frames
+  double residual_square = 0.0, score_square = 0.0;
+  for (std::size_t j = 0; j < x.size(); ++j) {
+    const bool is_new = j == 0 || view.frame(rows[j]) != view.frame(rows[j - 1]);
+    if (is_new) scores.push_back(0.0);
+    const double residual = y[j] - mean_y - slope * (x[j] - mean_x);
+    const double score = (x[j] - mean_x) * residual;
+    scores.back() += score;
+    residual_square += residual * residual;
+    score_square += score * score;
+  }
+  double frame_square = 0.0;
+  for (const double score : scores) frame_square += score * score;
+  const auto n = static_cast<double>(x.size());
+  const double dependence = std::max(1.0, frame_square / score_square) * CorrelationTime(scores);
+  return {slope, product / std::sqrt(square * residual_square / n * dependence),
+          std::sqrt(square / n)};
+}
+
 /// Innovations, and the rates of their predictions.
 struct RateSamples {
   Rows rows;
   std::vector<double> rate;  ///< dh/dt / sqrt(S), 1/s
   std::vector<double> u;
+  std::vector<double> step_s;  ///< time to the previous measurement
 };
 
 /// Computes the rate of h by the difference to the previous measurement of the same landmark. Such
@@ -82,48 +129,33 @@ RateSamples RatesOf(const InnovationView& view, std::size_t k) {
   for (const std::size_t i : view.tested()) {
     const auto [entry, is_first] = previous.try_emplace(view.series().landmarks[i], i);
     const std::size_t before = std::exchange(entry->second, i);
-    const double dt = view.time_s(i) - view.time_s(before);
-    if (!is_first && dt == 0.0) return {};
-    if (is_first || !(dt > 0.0)) continue;
+    const double step_s = view.time_s(i) - view.time_s(before);
+    if (!is_first && step_s == 0.0) return {};
+    if (is_first || !(step_s > 0.0)) continue;
     samples.rows.push_back(i);
-    samples.rate.push_back((view.h(i, k) - view.h(before, k)) / dt / view.s(i, k));
+    samples.rate.push_back((view.h(i, k) - view.h(before, k)) / step_s / view.s(i, k));
     samples.u.push_back(view.u(i, k));
+    samples.step_s.push_back(step_s);
   }
   return samples;
 }
 
-/// Slope of u against the rate, in s, by least squares. Its variance is that of sums over frames,
-/// because the innovations of a frame depend on the same prediction.
+/// Slope of u against the rate, in s. Returns 0 if the offset is too small to matter, or longer
+/// than kMaxSteps time steps: other errors also make innovations proportional to the rate.
 ElementStatistic OffsetOf(const InnovationView& view, std::size_t k) {
   constexpr std::size_t kMinSamples = 30;
-  constexpr double kMinSigmas = 0.1;  // root mean square of the effect on u
+  constexpr double kMinSigmas = 0.1, kMaxSteps = 3.0;
   if (!view.has_z(k)) return {};
   const RateSamples samples = RatesOf(view, k);
   if (samples.rows.size() <= kMinSamples) return {};
-  const double mean_rate = Mean(samples.rate), mean_u = Mean(samples.u);
-  const double square = SquaredDeviation(samples.rate);
-  if (!(square > 1e-12 * (square + mean_rate * mean_rate))) return {};
-  double product = 0.0;
-  for (std::size_t j = 0; j < samples.u.size(); ++j) {
-    product += (samples.rate[j] - mean_rate) * (samples.u[j] - mean_u);
-  }
-  const double slope = product / square;
-  const double rate_rms = std::sqrt(square / static_cast<double>(samples.rate.size()));
-  if (!(std::abs(slope) * rate_rms > kMinSigmas)) return {};
-  std::size_t j = 0;
-  std::vector<double> scores;
-  double variance = 0.0;
-  for (const FrameSum& frame : SumFrames(view, samples.rows, [&](std::size_t) {
-         const double rate = samples.rate[j] - mean_rate;
-         return rate * (samples.u[j++] - mean_u - slope * rate);
-       })) {
-    scores.push_back(frame.sum);
-    variance += frame.sum * frame.sum;
-  }
-  return {slope * square / std::sqrt(variance * CorrelationTime(scores)), slope};
+  const Line line = FitLine(view, samples.rows, samples.rate, samples.u);
+  const double offset_s = std::abs(line.slope);
+  if (!(offset_s * line.x_spread > kMinSigmas)) return {};
+  if (offset_s > kMaxSteps * Median(samples.step_s)) return {};
+  return {line.normal, line.slope};
 }
 
-/// Ratio of the mean of a squared innovation to its expected value, by frames of the core.
+/// Ratio of the mean of a squared innovation to its expected value.
 struct Scale {
   double ratio = 1.0;
   double independent = 1.0;  ///< number of independent frames
@@ -132,10 +164,17 @@ struct Scale {
   /// Returns the factor of the innovations.
   double factor() const { return std::sqrt(ratio); }
 };
+
+/// Computes the ratio from the means of value(i) over frames. The innovations of a consistent
+/// filter are white. Their autocorrelation time is therefore limited to kMaxTime; otherwise a
+/// persistent error would hide itself.
 template <class Value>
-Scale ScaleOf(const InnovationView& view, const Value& value) {
-  const std::vector<double> means = FrameMeans(view, view.core(), value);
-  return {Mean(means), static_cast<double>(means.size()) / CorrelationTime(means)};
+Scale ScaleOf(const InnovationView& view, const Rows& rows, const Value& value) {
+  constexpr double kMaxTime = 5.0;
+  const std::vector<double> means = FrameMeans(view, rows, value);
+  if (means.empty()) return {};
+  return {Mean(means),
+          static_cast<double>(means.size()) / std::min(CorrelationTime(means), kMaxTime)};
 }
 
 /// Returns the mean NIS of a quarter of the core, from the measurement `begin`. `order` sorts the
@@ -145,6 +184,15 @@ double QuarterMean(const InnovationView& view, const Rows& order, std::size_t be
   const std::size_t count = order.size() / 4;
   for (std::size_t j = 0; j < count; ++j) sum += view.nis(order[begin + j]);
   return sum / static_cast<double>(count);
+}
+
+/// Returns the accepted measurements without those of the first frames.
+Rows AcceptedRows(const InnovationView& view) {
+  Rows rows;
+  for (const std::size_t i : view.tested()) {
+    if (view.is_accepted(i)) rows.push_back(i);
+  }
+  return rows;
 }
 
 }  // namespace
@@ -161,17 +209,12 @@ MaybeFinding TestNoiseModel(const InnovationView& view) {
     size.push_back(std::log(std::abs(view.h(i, 0))));
     nis.push_back(std::min(view.nis(i), kMaxNis));
   }
-  if (FrameMeans(view, rows, [](std::size_t) { return 0.0; }).size() <= kMinFrames) return {};
-  const auto n = static_cast<double>(rows.size());
-  const double square = SquaredDeviation(size), mean = Mean(size);
-  if (!(std::sqrt(square / n) > kMinSpread)) return {};
-  double product = 0.0;
-  for (std::size_t j = 0; j < nis.size(); ++j) product += (size[j] - mean) * nis[j];
-  const double normal = product / std::sqrt(square * SquaredDeviation(nis) / n);
-  if (!(std::abs(normal) > kMaxNormal)) return {};
+  if (CountFrames(view, rows) <= kMinFrames) return {};
+  const Line line = FitLine(view, rows, size, nis);
+  if (!(line.x_spread > kMinSpread && std::abs(line.normal) > kMaxNormal)) return {};
   std::ranges::sort(rows, {}, [&](std::size_t i) { return std::abs(view.h(i, 0)); });
   return MakeFinding(
-      FindingKind::kHeteroscedastic, view, normal,
+      FindingKind::kHeteroscedastic, view, line.normal,
       "the NIS is " + RoundedText(QuarterMean(view, rows, 0), 3) +
           " at the smallest quarter of the predictions and " +
           RoundedText(QuarterMean(view, rows, rows.size() - rows.size() / 4), 3) +
@@ -181,10 +224,13 @@ MaybeFinding TestNoiseModel(const InnovationView& view) {
 
 MaybeFinding TestTails(const InnovationView& view) {
   if (!view.has_outliers() || view.series().has_robust_loss) return {};
-  return MakeFinding(FindingKind::kHeavyTails, view, view.outlier_share(),
-                     RoundedText(100.0 * view.outlier_share(), 2) +
-                         " % of the innovations are outliers, and 0.01 % are expected; use `gate`, "
-                         "`loss: {huber: 1.345}` or `outlier_rejection`");
+  return MakeFinding(
+      FindingKind::kHeavyTails, view, view.outlier_share(),
+      RoundedText(100.0 * view.outlier_share(), 2) +
+          " % of the innovations are outliers, and 0.01 % are expected; " +
+          (view.rejected().empty()
+               ? "use `gate`, `loss: {huber: 1.345}` or `outlier_rejection`"
+               : "the gate rejects some of them; find their cause, or use `loss: {huber: 1.345}`"));
 }
 
 MaybeFinding TestElements(const InnovationView& view) {
@@ -193,14 +239,15 @@ MaybeFinding TestElements(const InnovationView& view) {
   double smallest = 1e300, largest = 0.0, worst = 1.0;
   std::string list;
   for (std::size_t k = 0; k < view.dof(); ++k) {
-    const Scale scale = ScaleOf(view, [&](std::size_t i) { return view.u(i, k) * view.u(i, k); });
+    const Scale scale =
+        ScaleOf(view, view.core(), [&](std::size_t i) { return view.u(i, k) * view.u(i, k); });
     const double factor = scale.factor();
     smallest = std::min(smallest, factor);
     largest = std::max(largest, factor);
     const bool is_wrong = std::abs(std::log(factor)) > std::log(kMinFactor);
     if (!is_wrong || scale.Test(1.0) == ScaleTest::kPassed) continue;
-    list +=
-        (list.empty() ? "" : ", ") + RoundedText(factor, 3) + " for element " + std::to_string(k);
+    list += (list.empty() ? "" : ", ") + RoundedText(factor, 3) + " for element " +
+            std::to_string(k) + UnitHint(factor);
     if (std::abs(std::log(factor)) > std::abs(std::log(worst))) worst = factor;
   }
   if (list.empty() || !(largest > kMinContrast * smallest)) return {};
@@ -222,10 +269,11 @@ MaybeFinding TestTimeOffset(const InnovationView& view) {
                          "innovations are proportional to the rate of the prediction, as if "
                          "measurements were made " +
                          RoundedText(1e3 * std::abs(offset.value), 3) + " ms " +
-                         (offset.value > 0.0 ? "after" : "before") + " their timestamps; add " +
+                         (offset.value > 0.0 ? "after" : "before") +
+                         " their timestamps; check the clocks: add " +
                          RoundedText(offset.value, 2) +
-                         " to `time_offset_s` of the sensor, or estimate it, because the true "
-                         "value may be larger");
+                         " to `time_offset_s` of this sensor or subtract it from that of another "
+                         "one, or estimate it, because the true value may be larger");
 }
 
 MaybeFinding TestBias(const InnovationView& view) {
@@ -262,14 +310,24 @@ MaybeFinding TestScaleOfNis(const InnovationView& view) {
   if (view.series().has_robust_loss) return {};
   const int dof = view.series().dof;
   const double expected = dof * view.expected_nis();
-  const Scale scale = ScaleOf(view, [&](std::size_t i) { return view.nis(i) / expected; });
+  const auto relative_nis = [&](std::size_t i) { return view.nis(i) / expected; };
+  const Scale scale = ScaleOf(view, view.core(), relative_nis);
   const ScaleTest test = scale.Test(dof);
+  if (test != ScaleTest::kTooLarge) {
+    const Scale all = ScaleOf(view, AcceptedRows(view), relative_nis);
+    if (all.Test(dof) == ScaleTest::kTooLarge) {
+      return MakeFinding(FindingKind::kOverconfident, view, all.factor(),
+                         "the mean NIS is " + RoundedText(all.ratio, 3) +
+                             " times its expected value, because some innovations are far too "
+                             "large; look for jumps and outliers of the sensor");
+    }
+  }
   if (test == ScaleTest::kPassed) return {};
   const double factor = scale.factor();
   const bool is_large = test == ScaleTest::kTooLarge;
   const FindingKind kind = is_large ? FindingKind::kOverconfident : FindingKind::kUnderconfident;
-  const std::string size =
-      "innovations are " + RoundedText(factor, 3) + " times as large as predicted";
+  const std::string size = "innovations are " + RoundedText(factor, 3) +
+                           " times as large as predicted" + UnitHint(factor);
   if (TestElements(view)) {
     return MakeFinding(kind, view, factor, size + "; this ratio depends on the element");
   }
@@ -281,7 +339,7 @@ MaybeFinding TestScaleOfNis(const InnovationView& view) {
   return MakeFinding(kind, view, factor,
                      size + ", so sigma or the process noise is too " +
                          (is_large ? "small" : "large") + "; multiply sigma by about " +
-                         RoundedText(factor, 2) + map);
+                         RoundedText(factor, 2) + ", or change the process noise" + map);
 }
 
 }  // namespace alidade::internal

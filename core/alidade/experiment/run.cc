@@ -300,10 +300,11 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
   if (reference >= 0 && !runs.empty()) {
     run_guarded([&] { Compare(runs, reference, stored, result); });
   }
+  const bool is_failed = result.status == RunStatus::kFailed;
   for (EstimatorRun& run : runs) {
     run_guarded([&] {
       ComputeMetrics(run, result);
-      internal::CompleteResult(experiment, run);
+      internal::CompleteResult(experiment, run, is_failed ? result.reason : "");
     });
     result.estimators.push_back(std::move(run.result));
   }

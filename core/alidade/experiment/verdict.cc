@@ -65,8 +65,10 @@ Verdict FromNees(std::span<const NeesSeries> owners) {
     double sum = 0.0;
     for (const double value : owner.values) sum += value;
     const double mean = sum / static_cast<double>(owner.values.size());
-    const ScaleTest test = TestScale(mean, owner.dof, IndependentValues(owner, mean));
-    means += (means.empty() ? "" : ", ") + owner.owner + ' ' + RoundedText(mean, 3);
+    const double independent = IndependentValues(owner, mean);
+    const ScaleTest test = TestScale(mean, owner.dof, independent);
+    means += (means.empty() ? "" : ", ") + owner.owner + ' ' + RoundedText(mean, 3) +
+             (independent > 1.0 ? "" : " (nearly constant)");
     if (test == ScaleTest::kPassed) continue;
     const double distance = std::max(mean, 1.0 / mean);
     if (!(distance > worst)) continue;
@@ -87,26 +89,29 @@ Verdict FromNees(std::span<const NeesSeries> owners) {
   return verdict;
 }
 
-/// Returns the verdict of the first finding about the size of the innovations, if there is one.
+/// Returns the verdict of the findings about the size of the innovations, if there are any. Its
+/// reason is the first finding of all.
 std::optional<Verdict> FromInnovationSizes(std::span<const Finding> findings) {
   for (const Finding& finding : findings) {
     const bool is_large = finding.kind == FindingKind::kOverconfident;
     if (!is_large && finding.kind != FindingKind::kUnderconfident) continue;
     return Verdict{.state = is_large ? VerdictState::kOverconfident : VerdictState::kUnderconfident,
-                   .because = finding.text,
+                   .because = findings.front().text,
                    .basis = VerdictBasis::kNis};
   }
   return std::nullopt;
 }
 
 /// Returns the verdict without truth of an estimator whose innovations have the expected size.
-Verdict WithoutTruth(std::int64_t innovations) {
-  if (innovations < kMinSamples) {
-    return {.because = "there are only " + std::to_string(innovations) +
-                       " innovations to test, and no truth"};
+Verdict WithoutTruth(const VerdictFacts& facts) {
+  if (facts.tested_sensors == 0) {
+    return {.because =
+                "there is no truth, and no sensor without robust loss has accepted "
+                "measurements at " +
+                std::to_string(kMinDiagnosedFrames) + " timestamps"};
   }
   return {.state = VerdictState::kConsistent,
-          .because = "the NIS of each sensor is as expected; there is no truth to test the errors",
+          .because = "the NIS is as expected; there is no truth to test the errors",
           .basis = VerdictBasis::kNis};
 }
 
@@ -117,6 +122,10 @@ Verdict VerdictOf(const VerdictFacts& facts) {
   };
   if (facts.failed) return FromEvent(VerdictState::kFailed, facts.events, is_divergence);
   if (facts.diverged) return FromEvent(VerdictState::kDiverged, facts.events, is_divergence);
+  if (!facts.run_failure.empty()) {
+    return {.state = VerdictState::kFailed,
+            .because = "the run ended early: " + std::string(facts.run_failure)};
+  }
   const auto is_lost = [](const Event& event) { return event.kind == EventKind::kLost; };
   if (std::ranges::any_of(facts.events, is_lost)) {
     Verdict verdict = FromEvent(VerdictState::kLost, facts.events, is_lost);
@@ -124,12 +133,13 @@ Verdict VerdictOf(const VerdictFacts& facts) {
     return verdict;
   }
   if (const auto rejected = FromRejections(facts.sensors)) return *rejected;
-  const Verdict verdict =
-      facts.nees.empty() ? WithoutTruth(facts.innovations) : FromNees(facts.nees);
+  Verdict verdict = facts.nees.empty() ? WithoutTruth(facts) : FromNees(facts.nees);
   const bool is_wrong =
       verdict.basis == VerdictBasis::kNees && verdict.state != VerdictState::kConsistent;
   if (is_wrong) return verdict;
-  return FromInnovationSizes(facts.findings).value_or(verdict);
+  if (const auto sizes = FromInnovationSizes(facts.findings)) return *sizes;
+  if (!facts.findings.empty()) verdict.because += "; but " + facts.findings.front().text;
+  return verdict;
 }
 
 }  // namespace

@@ -51,10 +51,19 @@ inline constexpr std::array kVerdicts = {
     VerdictInfo{VerdictState::kUnderconfident, "underconfident",
                 "the errors are smaller than P indicates: a mean NEES or NIS is too small"},
     VerdictInfo{VerdictState::kNotTested, "not tested",
-                "there were fewer than 20 errors or innovations to test"},
+                "there were too few errors or innovations to test"},
     VerdictInfo{VerdictState::kConsistent, "consistent",
                 "the tests by NEES and NIS, or without truth by NIS, were passed"},
 };
+
+static_assert(
+    [] {
+      for (std::size_t i = 0; i < kVerdicts.size(); ++i) {
+        if (kVerdicts[i].state != static_cast<VerdictState>(i)) return false;
+      }
+      return kVerdicts.back().state == VerdictState::kConsistent;
+    }(),
+    "kVerdicts must have one entry for each VerdictState, in the order of VerdictState");
 
 /// Data that a verdict is based on.
 enum class VerdictBasis { kNone, kNis, kNees };
@@ -94,19 +103,21 @@ struct SensorUse {
 /// Facts about a run that determine the verdict.
 struct VerdictFacts {
   bool failed = false, diverged = false;
+  std::string_view run_failure = {};  ///< reason why the run ended before the data did, or ""
   std::span<const Event> events = {};
   std::span<const SensorUse> sensors = {};
   std::span<const NeesSeries> nees = {};   ///< empty if the truth is unknown
   std::span<const Finding> findings = {};  ///< about the innovations
-  std::int64_t innovations = 0;            ///< number of innovations that were tested
+  int tested_sensors = 0;                  ///< sensors whose size of innovations was tested
 };
 
 /// Computes the verdict. The mean of n values of NEES / dof is too large if it exceeds the quantile
 /// of chi2(nu) / nu of probability 1 - 8e-7 and is at least 1.15^2. It is too small if it is below
 /// the quantile of probability 8e-7 and at most 1.15^-2. nu = dof n / (5 tau) with the
 /// autocorrelation time; the factor 5 allows for slow components that a short run hides. nu = dof
-/// if the values are nearly constant. If the NEES passes, or without truth, the findings about the
-/// size of the innovations determine the verdict.
+/// if the values are nearly constant. If the NEES passes, or without truth, findings about the size
+/// of the innovations determine the verdict. The reason is then the first finding, which usually
+/// explains the others.
 Verdict ComputeVerdict(const VerdictFacts& facts);
 
 }  // namespace alidade

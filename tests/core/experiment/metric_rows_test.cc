@@ -217,6 +217,13 @@ TEST(VerdictText, ShowsThreeFindingsAndCountsTheOthers) {
       "1 more\n");
 }
 
+TEST(VerdictText, MarksAnEstimatorThatIsExpectedToBePoor) {
+  RunResult result;
+  result.estimators = {WithFindings("ekf", {})};
+  result.estimators[0].expects_poor = true;
+  EXPECT_EQ(VerdictText(result), "ekf  lost (poor is expected): far off\n");
+}
+
 TEST(VerdictText, DoesNotRepeatTheFindingsOfAnEarlierEstimator) {
   RunResult result;
   result.estimators = {WithFindings("ekf", {"one"}), WithFindings("ukf", {"two"}),

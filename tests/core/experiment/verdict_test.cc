@@ -79,6 +79,18 @@ TEST(Verdict, MentionsTheEventThatDigitsWereLost) {
   EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kConsistent);
 }
 
+TEST(Verdict, OfARunThatEndedEarlyIsFailed) {
+  const NeesSeries nees = MakeNees(1.0, 200);
+  VerdictFacts facts;
+  facts.nees = {&nees, 1};
+  facts.run_failure = "data.csv:22: 'N/A' is not a number";
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kFailed);
+  EXPECT_EQ(ComputeVerdict(facts).because,
+            "the run ended early: data.csv:22: 'N/A' is not a number");
+  facts.diverged = true;
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kDiverged);
+}
+
 TEST(Verdict, CountsTheRejectionsAtTheEnd) {
   SensorUse use{.sensor = "gnss", .used = 1000, .rejected = 20, .rejected_in_a_row = 19};
   EXPECT_EQ(ComputeVerdict({.sensors = {&use, 1}}).state, VerdictState::kNotTested);
@@ -93,13 +105,25 @@ TEST(Verdict, UsesTheInnovationsWithoutTruth) {
   const Finding finding{FindingKind::kOverconfident, "gnss", "innovations are 2 times as large",
                         2.0};
   VerdictFacts facts;
-  facts.innovations = 19;
   EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kNotTested);
-  facts.innovations = 100;
+  facts.tested_sensors = 1;
   EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kConsistent);
   EXPECT_EQ(ComputeVerdict(facts).basis, VerdictBasis::kNis);
   facts.findings = {&finding, 1};
   EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kOverconfident);
+}
+
+TEST(Verdict, GivesTheFirstFindingAsTheReason) {
+  const std::vector<Finding> findings = {{FindingKind::kStuck, "gnss", "it repeats", 20.0},
+                                         {FindingKind::kOverconfident, "gnss", "too large", 2.0}};
+  VerdictFacts facts;
+  facts.tested_sensors = 1;
+  facts.findings = findings;
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kOverconfident);
+  EXPECT_EQ(ComputeVerdict(facts).because, "it repeats");
+  facts.findings = {findings.data(), 1};
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kConsistent);
+  EXPECT_NE(ComputeVerdict(facts).because.find("; but it repeats"), std::string::npos);
 }
 
 // The innovations of a filter are less correlated than its errors, so they show a wrong sigma in
@@ -110,7 +134,7 @@ TEST(Verdict, UsesTheInnovationsIfTheNeesIsPassed) {
   VerdictFacts facts;
   facts.nees = {&passed, 1};
   facts.findings = {&finding, 1};
-  facts.innovations = 100;
+  facts.tested_sensors = 1;
   EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kUnderconfident);
   EXPECT_EQ(ComputeVerdict(facts).basis, VerdictBasis::kNis);
   facts.nees = {&failed, 1};

@@ -68,10 +68,10 @@ Experiment MakeWithBatch(bool outliers, bool accepted) {
   options.gate = 0.9999;
   auto ekf = std::make_unique<Ekf>(problem, options, testing::StreamsOf(problem));
   experiment.estimators.push_back({"ekf", "ekf", EstimatorKind::kFilter, problem, std::move(ekf),
-                                   OnDivergence::kReport, OnPluginFailure::kSkip});
+                                   OnDivergence::kReport, OnPluginFailure::kSkip, false, ""});
   experiment.estimators.push_back({"batch", "ceres_batch", EstimatorKind::kBatch, problem,
                                    std::make_unique<Told>(problem), OnDivergence::kReport,
-                                   OnPluginFailure::kSkip});
+                                   OnPluginFailure::kSkip, false, ""});
   if (accepted) experiment.estimators[1].accepted_by = 0;
   return experiment;
 }

@@ -114,17 +114,20 @@ std::map<std::string, Interval> NeesBounds(const SweepSummary& summary) {
 
 std::string NeesLines(const std::vector<SweepSummary>& summaries) {
   std::string lines;
+  constexpr std::string_view kDof = "nees.dof:";
   for (const SweepSummary& summary : summaries) {
-    for (const auto& [key, bounds] : NeesBounds(summary)) {
-      const auto mean = summary.metrics.find(key);
+    for (const auto& [key, dof] : summary.metrics) {
+      if (!key.starts_with(kDof) || summary.used == 0) continue;
+      const std::string owner = key.substr(kDof.size());
+      const auto mean = summary.metrics.find("nees.mean:" + owner);
       if (mean == summary.metrics.end()) continue;
       const double value = mean->second.mean;
-      if (value >= bounds.low && value <= bounds.high) continue;
-      lines += summary.name + ": the mean NEES of " + key.substr(key.find(':') + 1) + " over " +
-               std::to_string(summary.used) + " runs is " + RoundedText(value, 3) +
-               ", outside the 95 % bounds [" + RoundedText(bounds.low, 3) + ", " +
-               RoundedText(bounds.high, 3) + "]: the filter is " +
-               (value > bounds.high ? "overconfident" : "underconfident") + '\n';
+      const ScaleTest test = TestScale(value, dof.mean, static_cast<double>(summary.used));
+      if (test == ScaleTest::kPassed) continue;
+      lines += summary.name + ": over " + std::to_string(summary.used) + " runs, the NEES of " +
+               owner + " is " + RoundedText(value, 3) + ", and 1 is expected: the filter is " +
+               (test == ScaleTest::kTooLarge ? "overconfident" : "underconfident") +
+               ", even if single runs are too short to show it\n";
     }
   }
   return lines.empty() ? "" : '\n' + lines;

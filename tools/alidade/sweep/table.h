@@ -22,8 +22,9 @@ std::int64_t CountWithheld(const SweepResult& result);
 /// time.
 std::map<std::string, Interval> NeesBounds(const SweepSummary& summary);
 
-/// Returns an empty line, and a line for each mean NEES outside the bounds. Returns "" if each mean
-/// NEES is inside the bounds.
+/// Returns an empty line, and a line for each mean NEES over the runs that is too large or too
+/// small (TestScale). Runs are independent, so this test finds errors that a single run is too
+/// short to show. Returns "" if each mean passes.
 std::string NeesLines(const std::vector<SweepSummary>& summaries);
 
 /// Returns an empty line, and a line about the reference of the errors. This line also contains the

@@ -122,14 +122,14 @@ Eigen::MatrixXd SquareRootEquations::Root(const FilterState& f) const {
 double SquareRootEquations::ComputeNis(FilterState& f, PendingMeasurement& pending) {
   const Workspace::Use use(f.work);
   const Eigen::Index m = pending.report->dof, n = root_.rows();
-  Workspace::Matrix hd = f.work.Take(m, variables_), s(pending.s, m, m);
-  Multiply(pending.linearised.h, root_, hd.rightCols(n));
+  Workspace::Matrix product = f.work.Take(m, variables_), s(pending.s, m, m);
+  Multiply(pending.linearised.h, root_, product.rightCols(n));
   if (variables_ > n) {
     Multiply(pending.linearised.h, f.motions.DiscreteNoise(f.size(), f.work),
-             hd.leftCols(variables_ - n));
+             product.leftCols(variables_ - n));
   }
   s = Eigen::Map<const RowMajor>(pending.R.data(), m, m);
-  s.noalias() += hd.lazyProduct(hd.transpose());
+  s.noalias() += product.lazyProduct(product.transpose());
   pending.report->s = {pending.s, pending.R.size()};
   return SquaredMahalanobis(pending.s, pending.innovation, pending.report->dof, f.work);
 }

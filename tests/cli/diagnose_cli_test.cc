@@ -79,5 +79,105 @@ TEST_F(DiagnoseCli, RefusesAFolderThatIsNotAFinishedRun) {
   EXPECT_TRUE(Contains(changed.err, "the column 'landmark' is missing")) << changed.err;
 }
 
+/// Settings that simulate a target with the models of the filter, and a stereo sensor with twice the
+/// noise that the filter assumes. A gate would reject the largest innovations, and shorten the step.
+const Arguments kNoisyStereo = {
+    "source={type: models, duration_s: 5, overrides: {sensors: {stereo: {sigma_px: 2}}}}",
+    "state.target.initial.depth={mean: 5, sigma: 0.02}",
+    "state.target.initial.depth_rate={mean: 0.3, sigma: 0.1}",
+    "state.template.initial.inverse_distance={mean: 0.2, sigma: 0.002}",
+    "sensors.stereo.focal_px=2000",
+    "estimators.ekf.gate=none"};
+
+TEST_F(DiagnoseCli, WhyNamesTheWrongSigmaAndASettingThatRemovesTheAlarm) {
+  const Outcome outcome = Diagnose(kNoisyStereo, {"--why"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  const std::size_t start = outcome.out.find("parameters of ekf:\n  sensors.stereo.sigma_px is 1");
+  ASSERT_NE(start, std::string::npos) << outcome.out;
+  const std::string option = "--set 'estimators.ekf.overrides.sensors.stereo.sigma_px=";
+  const std::size_t setting = outcome.out.find(option, start);
+  ASSERT_NE(setting, std::string::npos) << outcome.out;
+  const double sigma = std::stod(outcome.out.substr(setting + option.size()));
+  EXPECT_NEAR(sigma, 2.0, 0.4);
+  Arguments corrected = kNoisyStereo;
+  corrected.push_back("estimators.ekf.overrides.sensors.stereo.sigma_px=" + std::to_string(sigma));
+  EXPECT_TRUE(Contains(Diagnose(corrected, {"--why"}).out,
+                       "no other value of a parameter explains the innovations better"))
+      << Read("stdout");
+}
+
+TEST_F(DiagnoseCli, WhyListsEveryParameterInJson) {
+  const Outcome outcome = Diagnose(kNoisyStereo, {"--why", "--json"});
+  const Config json = Config::FromText(outcome.out, "stdout");
+  const Node parameters = json.root().At("estimators").At("ekf").At("parameters");
+  const std::vector<Node> tested = parameters.At("tested").Items();
+  ASSERT_EQ(tested.size(), 5u) << outcome.out;
+  EXPECT_EQ(tested[0].At("key").Text(), "sensors.stereo.sigma_px");
+  EXPECT_TRUE(tested[0].At("alarm").Flag());
+  EXPECT_GT(tested[0].At("z").Number(), 4.5);
+  EXPECT_EQ(tested[0].At("value").Number(), 1.0);
+  EXPECT_NEAR(tested[0].At("estimate").Number(), 2.0, 0.4);
+  EXPECT_EQ(parameters.At("not_tested").Items().size(), 0u);
+}
+
+TEST_F(DiagnoseCli, WhySaysThatASmootherIsNotTested) {
+  const Outcome outcome = Diagnose({"estimators.smoother={type: rts}"}, {"--why"});
+  EXPECT_TRUE(Contains(outcome.out,
+                       "parameters of smoother:\n  not tested: an estimator of type 'rts' has no "
+                       "innovations of predictions; only recursive filters are tested\n"))
+      << outcome.out;
+}
+
+TEST_F(DiagnoseCli, WhySaysThatRobustSensorsAreNotTested) {
+  const Outcome outcome = Diagnose(
+      {"sensors.stereo.loss={huber: 1.345}", "sensors.scale.loss={huber: 1.345}"}, {"--why"});
+  EXPECT_TRUE(Contains(outcome.out,
+                       "parameters of ekf:\n  not tested: all of its sensors have a "
+                       "robust `loss`"))
+      << outcome.out;
+}
+
+TEST_F(DiagnoseCli, WhyExplainsAParameterThatCannotBeTested) {
+  const Outcome outcome = Diagnose({"state.target.noise.acceleration=0"}, {"--why", "--json"});
+  const Config json = Config::FromText(outcome.out, "stdout");
+  const auto not_tested = json.root().At("estimators").At("ekf").At("parameters").At("not_tested");
+  ASSERT_EQ(not_tested.Items().size(), 1u) << outcome.out;
+  EXPECT_EQ(not_tested.Items()[0].At("key").Text(), "state.target.noise.acceleration");
+  EXPECT_EQ(not_tested.Items()[0].At("because").Text(), "the standard deviation is 0");
+}
+
+TEST_F(DiagnoseCli, OneEstimatorCanBeSelected) {
+  const Outcome one =
+      Diagnose({"estimators.two={type: ekf, sensors: [stereo]}"}, {"--estimator", "two"});
+  EXPECT_EQ(one.out, "diagnosis of two:\n  nothing found\n");
+  const Outcome unknown = Call({"diagnose", "out", "--estimator", "tow"});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_TRUE(Contains(unknown.err,
+                       "--estimator: the run has no estimator 'tow'; expected ekf, two; did you "
+                       "mean 'two'?"))
+      << unknown.err;
+}
+
+TEST_F(DiagnoseCli, WhyNeedsTheInputsAndTheDataOfTheRun) {
+  Write("table.csv", "t_s,d\n0,86\n0.1,87\n0.2,86.5\n");
+  ASSERT_EQ(Call({"run", "table.yaml", "-o", "out", "--no-figures", "--quiet"}).code, 0)
+      << Read("stderr");
+  EXPECT_EQ(Call({"diagnose", "out", "--why"}).code, 0) << Read("stderr");
+  Write("table.csv", "t_s,d\n0,86\n0.1,87\n0.2,84\n");
+  const Outcome changed = Call({"diagnose", "out", "--why"});
+  EXPECT_EQ(changed.code, 65);
+  EXPECT_TRUE(Contains(changed.err, "inputs.json: the data have changed since the run: data "))
+      << changed.err;
+  std::filesystem::remove(folder_ / "table.csv");
+  const Outcome missing = Call({"diagnose", "out", "--why"});
+  EXPECT_EQ(missing.code, 65);
+  EXPECT_TRUE(Contains(missing.err, "table.csv: this input is missing now")) << missing.err;
+  std::filesystem::remove(folder_ / "out/inputs.json");
+  const Outcome no_inputs = Call({"diagnose", "out", "--why"});
+  EXPECT_EQ(no_inputs.code, 66);
+  EXPECT_TRUE(Contains(no_inputs.err, "inputs.json: the file cannot be read")) << no_inputs.err;
+  EXPECT_EQ(Call({"diagnose", "out"}).code, 0) << "without --why, the inputs are not necessary";
+}
+
 }  // namespace
 }  // namespace alidade

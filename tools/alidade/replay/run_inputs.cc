@@ -246,6 +246,13 @@ std::vector<std::string> InputDifferences(const std::string& recorded, const std
   return differences;
 }
 
+std::vector<std::string> DataDifferences(const std::string& recorded, const std::string& file,
+                                         const std::string& current) {
+  std::vector<std::string> differences = InputDifferences(recorded, file, current);
+  std::erase_if(differences, [](const std::string& text) { return !text.starts_with("data "); });
+  return differences;
+}
+
 InputTexts ReadInputTexts(const fs::path& folder) {
   const auto read = [&folder](const char* name) {
     const fs::path file = folder / name;

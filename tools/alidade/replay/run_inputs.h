@@ -64,6 +64,10 @@ std::string WithoutOption(std::string text, const std::string& option, const std
 std::vector<std::string> InputDifferences(const std::string& recorded, const std::string& file,
                                           const std::string& current);
 
+/// Returns the differences of InputDifferences() that concern the data files.
+std::vector<std::string> DataDifferences(const std::string& recorded, const std::string& file,
+                                         const std::string& current);
+
 /// Texts of the two files that record the inputs of a folder.
 struct InputTexts {
   std::string config, inputs;

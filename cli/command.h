@@ -37,6 +37,7 @@ void AddPlugins(CLI::App& program, Action& action);
 void AddCheck(CLI::App& program, Action& action);
 void AddEval(CLI::App& program, Action& action);
 void AddDiagnose(CLI::App& program, Action& action);
+void AddReport(CLI::App& program, Action& action);
 void AddDoctor(CLI::App& program, Action& action);
 
 /// Arguments that name a config and the plugins that the config needs.

@@ -109,6 +109,7 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
   AddCheck(program, action);
   AddEval(program, action);
   AddDiagnose(program, action);
+  AddReport(program, action);
   AddDoctor(program, action);
   const auto polish = [&log_level](const auto& self, CLI::App& app) -> void {
     app.get_help_ptr()->description("print this help and exit");

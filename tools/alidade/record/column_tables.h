@@ -10,6 +10,7 @@
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/problem.h"
 #include "alidade/experiment/frame_innovation.h"
+#include "alidade/experiment/joint_nees.h"
 #include "alidade/experiment/source.h"
 #include "alidade/record/columns.h"
 #include "alidade/record/recorded_run.h"
@@ -159,8 +160,11 @@ struct BlockLayout {
   BlockId id;
   Space space;
   std::string name, unit;
-  int truth;  ///< index into SourceFrame::truth; -1: the block has no truth
+  int truth;                    ///< index into SourceFrame::truth; -1: the block has no truth
+  double truth_variance = 0.0;  ///< variance of each element of the truth
+  double prior_sigma = 0.0;     ///< result of LargestPriorSigma
 
+  std::string owner() const { return name.substr(0, name.find('.')); }
   std::size_t ambient() const { return static_cast<std::size_t>(space.geometry.ambient); }
   std::size_t tangent() const { return static_cast<std::size_t>(space.geometry.tangent); }
 };
@@ -261,6 +265,36 @@ inline constexpr std::array kErrorColumns{
         [](const BlockLayout& block, const BlockRow& row) { return row.ErrorOf(block); }},
     kSigmaColumns};
 
+/// Owner of blocks with truth, and a row of these blocks.
+struct OwnerLayout {
+  std::string name;
+  std::vector<BlockLayout> blocks;
+};
+/// Columns of errors.csv for each owner, after those of the blocks.
+inline constexpr std::array kOwnerColumns = std::to_array<ColumnInfo<OwnerLayout, BlockRow>>({
+    {"nees", "",
+     "NEES e' P^-1 e of the blocks of the owner, divided by its degrees of freedom; its mean is "
+     "the "
+     "metric `nees.mean:OWNER`; empty if the NEES is unknown",
+     [](const OwnerLayout& owner, const BlockRow& row, CsvFile& file) {
+       std::vector<Eigen::VectorXd> errors;
+       errors.reserve(owner.blocks.size());  // BlockError refers to the elements
+       std::vector<BlockError> known;
+       for (const BlockLayout& block : owner.blocks) {
+         const std::vector<double> error = row.ErrorOf(block);
+         if (error.empty()) continue;
+         errors.emplace_back(Eigen::Map<const Eigen::VectorXd>(error.data(), std::ssize(error)));
+         known.push_back({block.id, &errors.back(), block.truth_variance, block.prior_sigma});
+       }
+       const Nees nees = JointNees(row.state, known);
+       nees.dof > 0 ? WriteFinite(nees.value / nees.dof, file) : (void)file.Empty();
+     },
+     [](const OwnerLayout& owner) {
+       return std::vector<Column>{{"nees:" + owner.name, "", "", owner.name}};
+     },
+     "`nees:OWNER`"},
+});
+
 /// Appends the columns of one block.
 template <std::size_t kCount>
 void AppendColumns(const std::array<BlockColumnInfo, kCount>& table, const BlockLayout& block,
@@ -282,6 +316,37 @@ void WriteCells(const std::array<BlockColumnInfo, kCount>& table, const BlockLay
     file.Numbers(numbers.data(), numbers.size(), (block.*info.size)());
   }
 }
+
+// Columns of NAME/final_covariance.csv.
+
+struct CovarianceLayout {
+  std::vector<std::string> names;  ///< tangent elements whose variance is above zero
+};
+struct CovarianceRow {
+  std::size_t index;                  ///< row of P
+  const Eigen::MatrixXd& covariance;  ///< P of the elements
+};
+inline constexpr std::array kCovarianceColumns =
+    std::to_array<ColumnInfo<CovarianceLayout, CovarianceRow>>({
+        {"element", "", "tangent element of the row",
+         [](const CovarianceLayout& layout, const CovarianceRow& row, CsvFile& file) {
+           file.Text(layout.names[row.index]);
+         }},
+        {"covariance", "unit of the row * unit of the column",
+         "covariance of the element of the row and the element of the column",
+         [](const CovarianceLayout& layout, const CovarianceRow& row, CsvFile& file) {
+           for (std::size_t i = 0; i < layout.names.size(); ++i) {
+             file.Number(row.covariance(static_cast<Eigen::Index>(row.index),
+                                        static_cast<Eigen::Index>(i)));
+           }
+         },
+         [](const CovarianceLayout& layout) {
+           std::vector<Column> columns;
+           for (const std::string& name : layout.names) columns.push_back({name, "", ""});
+           return columns;
+         },
+         "`block.element`"},
+    });
 
 // Columns of NAME/innovations.csv.
 

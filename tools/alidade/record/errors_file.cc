@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/record/errors_file.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace alidade::internal {
@@ -11,6 +12,7 @@ ErrorsFile::ErrorsFile(const OutputFolder& folder, const std::string& estimator,
   for (const BlockLayout& block : blocks) {
     if (block.truth < 0) continue;
     blocks_.push_back(block);
+    AddOwner(block);
     AppendColumns(kErrorColumns, block, columns);
     int element = 0;
     for (const std::string& name : TangentNames(block.name, block.space)) {
@@ -19,7 +21,15 @@ ErrorsFile::ErrorsFile(const OutputFolder& folder, const std::string& estimator,
     }
   }
   if (blocks_.empty()) return;
+  for (const OwnerLayout& owner : owners_) AppendColumns(kOwnerColumns, owner, columns);
   file_ = CreateCsv(folder, estimator + "/errors.csv", std::move(columns), run_columns);
+}
+
+/// Adds a block to its owner.
+void ErrorsFile::AddOwner(const BlockLayout& block) {
+  auto owner = std::ranges::find(owners_, block.owner(), &OwnerLayout::name);
+  if (owner == owners_.end()) owner = owners_.insert(owner, {block.owner(), {}});
+  owner->blocks.push_back(block);
 }
 
 /// Records which elements have a known error, and which have a variance above zero.
@@ -43,6 +53,7 @@ void ErrorsFile::Add(const SourceFrame& frame, const State& state) {
   Record(row);
   file_->Time(frame.timestamp);
   for (const BlockLayout& block : blocks_) WriteCells(kErrorColumns, block, row, *file_);
+  for (const OwnerLayout& owner : owners_) WriteCells(kOwnerColumns, owner, row, *file_);
   file_->EndRow();
 }
 

@@ -11,10 +11,11 @@
 namespace alidade::internal {
 
 /// Writer of `NAME/errors.csv`. The file exists if the source provides the truth of a block. It
-/// contains these numbers for each tangent element:
+/// contains these numbers for each tangent element, and the NEES for each owner:
 ///
 ///   e      = x (-) x_true    error, in the tangent space at the estimate
 ///   sigma  = sqrt(P_ii)      standard deviation of the estimate, without that of the truth
+///   nees   = e' P^-1 e / n   of all n elements of the owner, see JointNees
 ///
 /// e is computed as -(x_true (-) x), which equals x (-) x_true for vectors, angles and rotations.
 /// The error of a rotation is expressed in the body frame, in rad.
@@ -34,7 +35,10 @@ class ErrorsFile {
  private:
   void Record(const BlockRow& row);
 
+  void AddOwner(const BlockLayout& block);
+
   std::vector<BlockLayout> blocks_;  ///< blocks that have a truth
+  std::vector<OwnerLayout> owners_;
   std::vector<RecordedError> elements_;
   std::optional<CsvFile> file_;  ///< empty if no block has a truth
 };

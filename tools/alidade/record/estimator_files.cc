@@ -82,6 +82,7 @@ void EstimatorFiles::OpenEstimates(const OutputFolder& folder, RunColumns& run_c
   estimates_ =
       CreateCsv(folder, recorded_.name + "/estimates.csv", std::move(columns), run_columns);
   errors_.emplace(folder, recorded_.name, blocks, run_columns);
+  final_covariance_.emplace(blocks);
 }
 
 void EstimatorFiles::OpenTrajectory(const OutputFolder& folder, const Problem& problem) {
@@ -198,6 +199,7 @@ void EstimatorFiles::AddEstimate(const SourceFrame& frame, const State& state) {
     WriteCells(kEstimateColumns, block.layout, {frame, state}, *estimates_);
   }
   estimates_->EndRow();
+  final_covariance_->Set(state);
   if (!covariances_) return;
   static_assert(std::endian::native == std::endian::little);
   std::vector<double> cells;
@@ -261,7 +263,8 @@ void EstimatorFiles::AddGain(Timestamp timestamp, const State& state,
   gains_->EndRow();
 }
 
-void EstimatorFiles::Close() {
+void EstimatorFiles::Close(const OutputFolder& folder, RunColumns& run_columns) {
+  final_covariance_->Write(folder, recorded_.name, run_columns);
   estimates_->Close();
   innovations_->Close();
   gains_->Close();

@@ -7,6 +7,7 @@
 #include "alidade/experiment/run.h"
 #include "alidade/io/csv_file.h"
 #include "alidade/record/column_tables.h"
+#include "alidade/record/covariance_file.h"
 #include "alidade/record/errors_file.h"
 #include "alidade/record/pose_file.h"
 #include "alidade/record/recorded_run.h"
@@ -17,6 +18,7 @@ namespace alidade::internal {
 /// and the sensors of the initial problem:
 ///
 ///   estimates.csv, innovations.csv, gains.csv
+///   final_covariance.csv         if a block has a covariance
 ///   errors.csv                   if a block has a truth
 ///   reprojection.csv             if a sensor observes landmarks
 ///   trajectory.tum               if there are blocks X.position and X.orientation
@@ -32,8 +34,9 @@ class EstimatorFiles {
   /// Writes the rows of a frame. If the frame is older than the state, the estimate and its error
   /// are not written, because they belong to a later timestamp. Error: kIo.
   void Add(const SourceFrame& frame, const State& state, const UpdateReport& report);
-  /// Closes all files and completes recorded(). Error: kIo.
-  void Close();
+  /// Closes all files, writes final_covariance.csv and completes recorded(). Errors: kIo,
+  /// kCannotCreate.
+  void Close(const OutputFolder& folder, RunColumns& run_columns);
   const RecordedEstimator& recorded() const { return recorded_; }
 
  private:
@@ -64,6 +67,7 @@ class EstimatorFiles {
   std::optional<ErrorsFile> errors_;
   std::optional<PosePlace> pose_;  ///< indices of the blocks of the pose
   std::optional<PoseFile> trajectory_, trajectory_covariance_;
+  std::optional<CovarianceFile> final_covariance_;
   std::unique_ptr<OutputFile> covariances_;  ///< covariance.bin; null if not requested
 };
 

@@ -107,7 +107,7 @@ internal::RecordedRun Recorder::Impl::CloseFiles() {
     timing->Describe(recorded);
   }
   for (const auto& estimator : estimators) {
-    estimator->Close();
+    estimator->Close(folder, run_columns);
     recorded.estimators.push_back(estimator->recorded());
   }
   return recorded;

@@ -67,6 +67,7 @@ Json EstimatorsOf(const std::vector<SweepSummary>& summaries) {
     for (const auto& [key, bounds] : internal::NeesBounds(summary)) {
       nees[key] = {{"low", bounds.low}, {"high", bounds.high}};
     }
+    entry["units"] = summary.units;
   }
   return json;
 }

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "alidade/report/run_tables.h"
+
+namespace alidade::internal {
+
+/// Returns the object of an estimator in the data of a page. `columns` are the contents of
+/// columns.json. `gate` is the probability of the gate, or null. docs/report.md describes the
+/// object.
+Json EstimatorData(const EstimatorTables& tables, const Json& columns, const Json& gate,
+                   const RunTimes& times, ColumnPool& pool);
+
+}  // namespace alidade::internal

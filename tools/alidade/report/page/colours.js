@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Colours and dashes. They identify estimators in all figures.
+
+// The palette of Okabe and Ito. The sixth and later estimators repeat the hues with dashes.
+// Vermillion is reserved for rejected measurements.
+const LIGHT = ['#0072B2', '#E08A00', '#009E73', '#CC79A7', '#4FA9DB'];
+
+const DARK = ['#4AA8E8', '#E69F00', '#1FC796', '#DE93BC', '#8ACBF0'];
+const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3]];
+
+const colorOf = (name) => {
+  const i = NAMES.indexOf(name);
+  return i < 0 ? ink() : (page.dark ? DARK : LIGHT)[i % 5];
+};
+
+const dashOf = (name) => DASHES[Math.max(0, Math.floor(NAMES.indexOf(name) / 5)) % 4];
+const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const colours = {};
+
+function readPalette() {
+  for (const k of ['ink', 'muted', 'faint', 'grid', 'line', 'panel', 'shade', 'accent'])
+    colours[k] = css('--' + k);
+}
+
+const ink = () => colours.ink;
+const REJECTED = () => (page.dark ? '#FF6A3D' : '#D55E00');
+const nameStyle = document.head.appendChild(document.createElement('style'));
+
+/** Names are text: darker on white than the lines, so that they can be read. */
+const TEXT = ['#00639B', '#A65E00', '#007354', '#A34A7E', '#2A7BAA'];
+
+const textColor = (n) => (page.dark ? colorOf(n) : TEXT[NAMES.indexOf(n) % 5]);
+
+function setTheme(dark) {
+  page.dark = dark;
+  document.documentElement.dataset.theme = dark ? 'dark' : 'light';
+  readPalette();
+  nameStyle.textContent = NAMES.map(
+    (n) => `[data-est="${CSS.escape(n)}"] { color: ${textColor(n)}; }`,
+  ).join('\n');
+  redraw();
+}

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// Data of the page: the JSON object that the program wrote, and its columns.
+
+const DATA = JSON.parse(document.getElementById('data').textContent);
+
+if (DATA.format !== 'alidade-report' || DATA.version !== 1)
+  throw new Error('this page cannot read its data');
+
+const decoded = new Map();
+
+function bytes(base64) {
+  const s = atob(base64);
+  const out = new Uint8Array(s.length);
+  for (let i = 0; i < s.length; i++) out[i] = s.charCodeAt(i);
+  return out.buffer;
+}
+
+function decode(c) {
+  switch (c.d) {
+    case 'lin':
+      return Float64Array.from({length: c.n}, (_, i) => c.v + i * c.s);
+    case 'const':
+      return new Float32Array(c.n).fill(c.v === null ? NaN : c.v);
+    case 'take': {
+      const of = columnOf(c.of);
+      return Float64Array.from(columnOf(c.i), (i) => of[i]);
+    }
+    case 'f8':
+      return new Float64Array(bytes(c.b));
+    case 'u1':
+      return new Uint8Array(bytes(c.b));
+    case 'u2':
+      return new Uint16Array(bytes(c.b));
+    case 'u4':
+      return new Uint32Array(bytes(c.b));
+    case 'i2':
+      return Float32Array.from(new Int16Array(bytes(c.b)), (v) => (v === -32768 ? NaN : v * c.s));
+    case 'f4': {
+      const f = new Float32Array(bytes(c.b));
+      return c.o ? Float64Array.from(f, (v) => v + c.o) : f;
+    }
+  }
+  throw new Error('column of unknown kind ' + c.d);
+}
+
+function columnOf(ref) {
+  if (ref === null || ref === undefined) return null;
+  if (!decoded.has(ref)) decoded.set(ref, decode(DATA.columns[ref]));
+  return decoded.get(ref);
+}
+
+const RUN = DATA.run;
+const COMPARISON = DATA.compare;
+const SWEEP = DATA.sweep;
+
+const NAMES = RUN
+  ? RUN.estimators.map((e) => e.name)
+  : COMPARISON
+    ? COMPARISON.estimators.map((e) => e.name)
+    : unique(SWEEP ? SWEEP.groups.map((g) => g.estimator) : []);
+
+const isZero = (ref) => DATA.columns[ref].d === 'const' && DATA.columns[ref].v === 0;
+
+/** The truth of an element. The name of a truth is that of the block, or its last component. */
+function truthOf(block, element) {
+  const end = element ? '.' + element : '';
+  const whole = RUN.truth[block.name + end];
+  return columnOf(whole === undefined ? RUN.truth[block.name.split('.').pop() + end] : whole);
+}
+
+/** Use of a measurement with the outcome `code`: accepted, initialised, rejected or unused. */
+const useOf = (code) => RUN.outcomes[code].use;
+const isAccepted = (code) => useOf(code) === 'accepted';
+const isUsed = (code) => isAccepted(code) || useOf(code) === 'initialised';
+const isRejected = (code) => useOf(code) === 'rejected';
+
+/** Number of measurements of a sensor that an estimator rejected. */
+const rejectedCount = (e, sensor) =>
+  sum(
+    RUN.outcomes
+      .filter((outcome) => outcome.use === 'rejected')
+      .map((outcome) => e.counts[`${outcome.name}:${sensor}`] || 0),
+  );
+
+/** The columns of the landmarks of an estimator. */
+const mapColumns = (e) =>
+  Object.fromEntries(Object.entries(e.landmarks).map(([key, ref]) => [key, columnOf(ref)]));
+
+/** The first block with a truth. */
+const mainBlock = () => {
+  const e = RUN.estimators.find((q) => q.blocks.some((b) => b.error.length));
+  return e ? e.blocks.find((b) => b.error.length) : null;
+};

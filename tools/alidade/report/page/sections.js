@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sections of the page, and parts that are drawn when they are opened.
+
+const nav = [];
+
+function section(id, title, sub, parent) {
+  const s = element('section', {id}, element('h2', {}, title, sub && element('small', {}, sub)));
+  parent.append(s);
+  nav.push([id, title]);
+  return s;
+}
+
+function fold(parent, title, sub, build) {
+  // drawn when first opened
+  const box = element('div');
+  const d = element(
+    'details',
+    {class: 'more'},
+    element('summary', {}, title, sub && element('span', {}, sub)),
+    box,
+  );
+  d.addEventListener('toggle', () => {
+    if (d.open && !box.childElementCount) build(box);
+  });
+  d.build = () => {
+    if (!box.childElementCount) build(box);
+  };
+  parent.append(d);
+  return d;
+}
+
+function storyList(items) {
+  return element(
+    'ul',
+    {class: 'story'},
+    items.map((q) =>
+      element(
+        'li',
+        {},
+        element('span', {class: 'i ' + q.cls, 'aria-hidden': 'true'}, q.mark),
+        element('p', {}, q.text, q.more ? element('span', {class: 'more'}, ' ' + q.more) : null),
+      ),
+    ),
+  );
+}

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/report/run_data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "alidade/compare/run_files.h"
+#include "alidade/estimation/estimator.h"
+#include "alidade/report/estimator_data.h"
+#include "alidade/report/run_tables.h"
+
+namespace alidade::internal {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Returns the name of each outcome, and the use of a measurement with this outcome.
+Json OutcomeList() {
+  Json list = Json::array();
+  for (const OutcomeInfo& outcome : kOutcomes) {
+    const char* const use = outcome.outcome == Outcome::kAccepted ? "accepted"
+                            : outcome.is_initialisation           ? "initialised"
+                            : outcome.is_rejection                ? "rejected"
+                                                                  : "unused";
+    list.push_back({{"name", outcome.name}, {"use", use}});
+  }
+  return list;
+}
+
+/// Returns the probability of the gate of an estimator, or null.
+Json GateOf(const Node& config, const std::string& estimator) {
+  const auto estimators = config.Find("estimators");
+  if (!estimators || !estimators->is_map()) return {};
+  const auto entry = estimators->Find(estimator);
+  if (!entry || !entry->is_map()) return {};
+  const auto gate = entry->Find("gate");
+  if (!gate || gate->kind() != Node::Kind::kScalar || gate->Text() == "none") return {};
+  return gate->Number();
+}
+
+Json TruthData(const CsvColumns& truth, const RunTimes& times, ColumnPool& pool) {
+  Json data = Json::object();
+  const std::vector<Timestamp> timestamps = truth.Times();
+  for (const std::string_view name : truth.names()) {
+    if (name == "t_s") continue;
+    data[std::string(name)] = pool.AddNumbers(times.Align(timestamps, truth.Numbers(name)));
+  }
+  return data;
+}
+
+/// Returns the states that single measurements imply, for each sensor and block.
+Json ImpliedData(const CsvColumns& implied, const RunTimes& times, ColumnPool& pool) {
+  Json list = Json::array();
+  const std::vector<Timestamp> timestamps = implied.Times();
+  for (const std::string& sensor : DistinctTexts(implied, "sensor")) {
+    const std::vector<std::uint32_t> sensor_rows = RowsWith(implied, "sensor", sensor);
+    for (const std::string_view block : implied.names()) {
+      if (block == "t_s" || block == "sensor") continue;
+      const std::vector<double> values = implied.Numbers(block);
+      std::vector<std::uint32_t> rows;
+      for (const std::uint32_t row : sensor_rows) {
+        const bool is_in_run = std::ranges::binary_search(times.all(), timestamps[row]);
+        if (std::isfinite(values[row]) && is_in_run) rows.push_back(row);
+      }
+      if (rows.empty()) continue;
+      list.push_back({{"sensor", sensor},
+                      {"block", std::string(block)},
+                      {"t", times.ColumnOf(Select(timestamps, rows))},
+                      {"v", pool.AddNumbers(Select(values, rows))}});
+    }
+  }
+  return list;
+}
+
+/// Returns the timestamps at which any estimator received a valid measurement of `sensor`.
+std::set<Timestamp> ValidTimes(const std::deque<EstimatorTables>& estimators,
+                               const std::string& sensor) {
+  std::set<Timestamp> valid;
+  for (const EstimatorTables& estimator : estimators) {
+    const CsvColumns& table = estimator.innovations;
+    const std::vector<Timestamp> timestamps = table.Times();
+    const std::vector<std::string_view> outcomes = table.Texts("outcome");
+    for (const std::uint32_t row : RowsWith(table, "sensor", sensor)) {
+      const bool is_invalid = outcomes[row] == ToString(Outcome::kInvalid) ||
+                              outcomes[row] == ToString(Outcome::kNotFinite);
+      if (!is_invalid) valid.insert(timestamps[row]);
+    }
+  }
+  return valid;
+}
+
+/// Returns the intervals that contain all timestamps of a segment and no other. An interval ends
+/// at the next timestamp.
+Json SpansOf(const RunTimes& times, const std::set<Timestamp>& valid, bool with_measurement) {
+  Json spans = Json::array();
+  bool is_open = false;
+  for (const Timestamp time : times.all()) {
+    const bool is_inside = valid.contains(time) == with_measurement;
+    const double seconds = times.SecondsOf(time);
+    if (is_inside && !is_open) spans.push_back({seconds, seconds});
+    if (is_open) spans.back()[1] = seconds;
+    is_open = is_inside;
+  }
+  return spans;
+}
+
+Json SegmentData(const Node& config, const std::deque<EstimatorTables>& estimators,
+                 const RunTimes& times) {
+  Json list = Json::array();
+  const auto evaluate = config.Find("evaluate");
+  const auto segments = evaluate ? evaluate->Find("segments") : std::nullopt;
+  if (!segments) return list;
+  for (const auto& [name, rule] : segments->Entries()) {
+    const auto with = rule.Find("with"), without = rule.Find("without");
+    if (!with && !without) continue;
+    const std::string sensor = (with ? *with : *without).Text();
+    list.push_back({{"name", name},
+                    {"rule", (with ? "with " : "without ") + sensor},
+                    {"spans", SpansOf(times, ValidTimes(estimators, sensor), with.has_value())}});
+  }
+  return list;
+}
+
+}  // namespace
+
+Json RunData(const fs::path& folder, const Json& run, const Node& config, ColumnPool& pool) {
+  if (!run.contains("estimators")) return {};
+  std::deque<EstimatorTables> estimators;
+  const CsvColumns truth(folder / "truth.csv");
+  std::vector<Timestamp> timestamps = truth.Times();
+  for (const auto& [name, entry] : run.at("estimators").items()) {
+    if (!entry.contains("blocks")) continue;  // the run ended before the files were created
+    const EstimatorTables& tables = estimators.emplace_back(folder, name, entry);
+    for (const CsvColumns* table : {&tables.estimates, &tables.innovations}) {
+      const std::vector<Timestamp> more = table->Times();
+      timestamps.insert(timestamps.end(), more.begin(), more.end());
+    }
+  }
+  if (timestamps.empty() || estimators.empty()) return {};
+  const RunTimes times(std::move(timestamps), pool);
+  const Json columns = ReadJsonFile(folder / "columns.json");
+  Json data = {{"t", times.column()},
+               {"t0", Seconds(times.origin())},
+               {"outcomes", OutcomeList()},
+               {"truth", TruthData(truth, times, pool)},
+               {"implied", ImpliedData(CsvColumns(folder / "implied_states.csv"), times, pool)},
+               {"segments", SegmentData(config, estimators, times)}};
+  Json& list = data["estimators"] = Json::array();
+  for (const EstimatorTables& tables : estimators) {
+    list.push_back(EstimatorData(tables, columns, GateOf(config, tables.name), times, pool));
+  }
+  return data;
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/report/run_tables.h"
+
+#include <algorithm>
+#include <limits>
+#include <set>
+
+namespace alidade::internal {
+
+EstimatorTables::EstimatorTables(const std::filesystem::path& folder, const std::string& estimator,
+                                 const Json& run_entry)
+    : name(estimator),
+      entry(run_entry),
+      covariance_file(folder / name / "trajectory_covariance.tum"),
+      estimates(folder / name / "estimates.csv"),
+      errors(folder / name / "errors.csv"),
+      innovations(folder / name / "innovations.csv"),
+      gains(folder / name / "gains.csv"),
+      landmarks(folder / name / "landmarks.csv"),
+      events(folder / name / "events.csv"),
+      final_covariance(folder / name / "final_covariance.csv") {}
+
+RunTimes::RunTimes(std::vector<Timestamp> times, ColumnPool& pool)
+    : all_(std::move(times)), pool_(pool) {
+  std::ranges::sort(all_);
+  const auto repeated = std::ranges::unique(all_);
+  all_.erase(repeated.begin(), repeated.end());
+  column_ = pool.AddTimes(all_, origin());
+}
+
+std::uint32_t RunTimes::IndexOf(Timestamp time) const {
+  return static_cast<std::uint32_t>(std::ranges::lower_bound(all_, time) - all_.begin());
+}
+
+int RunTimes::ColumnOf(const std::vector<Timestamp>& times) const {
+  if (times == all_) return column_;
+  std::vector<std::uint32_t> indices;
+  indices.reserve(times.size());
+  for (const Timestamp time : times) indices.push_back(IndexOf(time));
+  return pool_.AddSelection(column_, indices);
+}
+
+double RunTimes::SecondsOf(Timestamp time) const {
+  if (time == kNoTimestamp) return std::numeric_limits<double>::quiet_NaN();
+  return Seconds(time - origin());
+}
+
+std::vector<double> RunTimes::Align(const std::vector<Timestamp>& times,
+                                    const std::vector<double>& values) const {
+  std::vector<double> aligned(all_.size(), std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = 0; i < times.size(); ++i) aligned[IndexOf(times[i])] = values[i];
+  return aligned;
+}
+
+std::vector<std::uint32_t> RowsWith(const CsvColumns& table, std::string_view name,
+                                    std::string_view text) {
+  std::vector<std::uint32_t> rows;
+  const std::vector<std::string_view> texts = table.Texts(name);
+  for (std::uint32_t row = 0; row < texts.size(); ++row) {
+    if (texts[row] == text) rows.push_back(row);
+  }
+  return rows;
+}
+
+std::vector<std::string> DistinctTexts(const CsvColumns& table, std::string_view name) {
+  const std::vector<std::string_view> texts = table.Texts(name);
+  const std::set<std::string_view> distinct(texts.begin(), texts.end());
+  return {distinct.begin(), distinct.end()};
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "alidade/io/json.h"
+#include "alidade/report/column_pool.h"
+#include "alidade/report/csv_columns.h"
+
+namespace alidade::internal {
+
+/// Files of one estimator in a run folder.
+struct EstimatorTables {
+  EstimatorTables(const std::filesystem::path& folder, const std::string& estimator,
+                  const Json& run_entry);
+
+  std::string name;
+  const Json& entry;  ///< entry of the estimator in run.json
+  std::filesystem::path covariance_file;
+  CsvColumns estimates, errors, innovations, gains, landmarks, events, final_covariance;
+};
+
+/// Timestamps of a run: the union of the timestamps of all its files, sorted. Stores the times of
+/// each file as places in this union.
+class RunTimes {
+ public:
+  /// Adds the union to `pool`. `times` must not be empty.
+  RunTimes(std::vector<Timestamp> times, ColumnPool& pool);
+
+  const std::vector<Timestamp>& all() const { return all_; }
+  Timestamp origin() const { return all_.front(); }
+  /// Returns the column of all timestamps.
+  int column() const { return column_; }
+  /// Returns the column of `times`, which are part of the union.
+  int ColumnOf(const std::vector<Timestamp>& times) const;
+  /// Returns seconds after the origin; NaN for kNoTimestamp.
+  double SecondsOf(Timestamp time) const;
+  /// Returns the values at all timestamps, of a file whose rows have the timestamps `times`.
+  std::vector<double> Align(const std::vector<Timestamp>& times,
+                            const std::vector<double>& values) const;
+
+ private:
+  std::uint32_t IndexOf(Timestamp time) const;
+
+  std::vector<Timestamp> all_;
+  ColumnPool& pool_;
+  int column_;
+};
+
+/// Returns the rows of `table` for which column `name` contains `text`.
+std::vector<std::uint32_t> RowsWith(const CsvColumns& table, std::string_view name,
+                                    std::string_view text);
+/// Returns the distinct texts of a column, sorted.
+std::vector<std::string> DistinctTexts(const CsvColumns& table, std::string_view name);
+
+}  // namespace alidade::internal

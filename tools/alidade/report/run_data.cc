@@ -114,12 +114,12 @@ Json SegmentData(const Node& config, const std::deque<EstimatorTables>& estimato
   const auto segments = evaluate ? evaluate->Find("segments") : std::nullopt;
   if (!segments) return list;
   for (const auto& [name, rule] : segments->Entries()) {
-    const auto with = rule.Find("with"), without = rule.Find("without");
-    if (!with && !without) continue;
-    const std::string sensor = (with ? *with : *without).Text();
+    const bool needs_measurement = rule.Find("with").has_value();
+    const char* const key = needs_measurement ? "with" : "without";
+    const std::string sensor = rule.At(key).Text();
     list.push_back({{"name", name},
-                    {"rule", (with ? "with " : "without ") + sensor},
-                    {"spans", SpansOf(times, ValidTimes(estimators, sensor), with.has_value())}});
+                    {"rule", key + (' ' + sensor)},
+                    {"spans", SpansOf(times, ValidTimes(estimators, sensor), needs_measurement)}});
   }
   return list;
 }

@@ -38,7 +38,7 @@ function storyList(items) {
         'li',
         {},
         element('span', {class: 'i ' + q.cls, 'aria-hidden': 'true'}, q.mark),
-        element('p', {}, q.text, q.more ? element('span', {class: 'more'}, ' ' + q.more) : null),
+        element('p', {}, q.text, q.more ? element('span', {class: 'more'}, ' ', q.more) : null),
       ),
     ),
   );

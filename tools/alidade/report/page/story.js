@@ -10,11 +10,9 @@ function story() {
     const end = `at ${clock(page.full[1])} s, after ${plural(DATA.frames || 0, 'frame')}`;
     add('bad', '✕', [`The run ${word} ${end}.`], DATA.reason);
   }
-  verdictItems(add);
+  consistentItem(add);
+  for (const group of similarEstimators()) estimatorItem(group, add);
   rankItem(add);
-  findingItems(add);
-  eventItems(add);
-  for (const e of RUN.estimators) describeEstimator(e, add);
   segmentItem(add);
   driftItem(add);
   mapItem(add);
@@ -25,22 +23,46 @@ function story() {
 const namesOf = (names) =>
   names.map((name, i) => [i ? (i === names.length - 1 ? ' and ' : ', ') : '', nameOf(name)]);
 
-/** One item for each state, the gravest first; it names all estimators in this state. */
-function verdictItems(add) {
-  const states = Object.keys(VERDICTS);
-  for (const state of states) {
-    const group = RUN.estimators.filter((e) => verdictOf(e).state === state);
-    if (!group.length) continue;
-    const {cls, mark} = verdictOf(group[0]);
-    const verb = /^(failed|diverged)$/.test(state) ? ' ' : group.length > 1 ? ' are ' : ' is ';
-    const word = state === 'not tested' ? 'not tested' : state;
-    const reasons = group.map((e) => {
-      const {because, since} = verdictOf(e);
-      const name = group.length > 1 ? [nameOf(e.name), ': '] : '';
-      return [name, because, since === null ? '' : [', from ', timeLink(since), ' on'], '. '];
-    });
-    add(cls, mark, [namesOf(group.map((e) => e.name)), verb, word, '.'], reasons);
+const sentence = (text) => text + (/[.!?]$/.test(text) ? '' : '.');
+const isConsistent = (e) => verdictOf(e).state === 'consistent';
+
+/** One item for all consistent estimators. */
+function consistentItem(add) {
+  const group = RUN.estimators.filter(isConsistent);
+  if (!group.length) return;
+  const reasons = group.map((e) => {
+    const name = group.length > 1 ? [nameOf(e.name), ': '] : '';
+    return [name, sentence(verdictOf(e).because), ' '];
+  });
+  const verb = group.length > 1 ? ' are' : ' is';
+  add('good', '✓', [namesOf(group.map((e) => e.name)), verb, ' consistent.'], reasons);
+}
+
+/** Groups of estimators with the same verdict, findings and events. */
+function similarEstimators() {
+  const groups = new Map();
+  for (const e of RUN.estimators) {
+    const key = JSON.stringify([e.verdict, e.diagnosis, e.events]);
+    if (!groups.has(key)) groups.set(key, []);
+    groups.get(key).push(e);
   }
+  return [...groups.values()];
+}
+
+/** One item for estimators with something to report: the verdict, then findings and events. */
+function estimatorItem(group, add) {
+  const [e] = group;
+  const {state, because, since, cls, mark} = verdictOf(e);
+  const notes = [...findingTexts(e), ...eventTexts(e), ...excursionText(e), ...fixText(e)];
+  const names = namesOf(group.map((member) => member.name));
+  if (isConsistent(e)) {
+    if (notes.length) add('calm', '·', [names, ': ', notes.shift()], notes);
+    return;
+  }
+  const be = group.length > 1 ? ' are ' : ' is ';
+  const verb = state === 'failed' || state === 'diverged' ? ' ' : be;
+  const time = since === null ? '' : [' at ', timeLink(since)];
+  add(cls, mark, [names, verb, state, time, ': ', sentence(because)], notes);
 }
 
 /** The two estimators with the least error of the first block with a truth. */
@@ -73,60 +95,24 @@ function rankItem(add) {
   );
 }
 
-/** Joins estimators that share a text: Map of text -> {names, first}. */
-function groupByText(entries) {
-  const groups = new Map();
-  for (const {name, text, first} of entries) {
-    if (!groups.has(text)) groups.set(text, {names: [], first});
-    const {names} = groups.get(text);
-    if (!names.includes(name)) names.push(name);
-  }
-  return groups;
-}
+const findingTexts = (e) => (e.diagnosis || []).map((finding) => sentence(finding.text) + ' ');
 
-const sentence = (text) => text + (/[.!?]$/.test(text) ? '' : '.');
+/** Kinds of events whose content a verdict reports. */
+const VERDICT_KINDS = /^(diverged|lost|mostly_rejected|nees_bounds|nis_bounds)$/;
 
-function findingItems(add) {
-  const entries = RUN.estimators.flatMap((e) =>
-    (e.diagnosis || []).map((finding) => ({name: e.name, text: finding.text})),
-  );
-  for (const [text, {names}] of groupByText(entries))
-    add('warn', '⚑', [namesOf(names), ': ', sentence(text)]);
-}
-
-/** Kinds of events whose content the verdicts already report. */
-const REPORTED_KINDS = ['nees_bounds', 'nis_bounds'];
-
-/** One item for each kind of event of each estimator: the first event, and their number. */
-function eventItems(add) {
-  const entries = RUN.estimators.flatMap((e) =>
-    unique(e.events.map((event) => event[1]))
-      .filter((kind) => !REPORTED_KINDS.includes(kind))
-      .map((kind) => {
-        const events = e.events.filter((event) => event[1] === kind);
-        const more = events.length > 1 ? ` (first of ${events.length} such events)` : '';
-        const [time, , text] = events[0];
-        return {name: e.name, first: {time, kind, text, more}, text: `${kind} ${time} ${text}`};
-      }),
-  );
-  for (const {names, first} of groupByText(entries).values()) {
-    const grave = /^(diverged|lost|plugin_failed|not_pd|no_solution)$/.test(first.kind);
-    const time = first.time === null ? '' : [' at ', timeLink(first.time)];
-    const kind = first.kind.replace(/_/g, ' ');
-    add(
-      grave ? 'bad' : 'warn',
-      grave ? '✕' : '!',
-      [namesOf(names), ', ', kind, time, ': ', sentence(first.text), first.more],
-    );
-  }
-}
-
-/** Facts that are visible in the figures of an estimator. */
-function describeEstimator(e, add) {
-  const say = (cls, mark, ...text) => add(cls, mark, [nameOf(e.name), ': ', ...text, '.']);
-  if (verdictOf(e).cls !== 'bad') describeExcursion(e, say);
-  describeFix(e, say);
-  describeGap(e, say);
+/** One text for each kind of event: the first event, and the number of the others. */
+function eventTexts(e) {
+  const kinds = unique(e.events.map((event) => event[1]));
+  return kinds
+    .filter((kind) => !VERDICT_KINDS.test(kind))
+    .map((kind) => {
+      const events = e.events.filter((event) => event[1] === kind);
+      const [time, , text] = events[0];
+      const others = events.length > 1 ? ` (${events.length - 1} more)` : '';
+      const place = time === null ? '' : [' at ', timeLink(time)];
+      const name = kind.replace(/_/g, ' ');
+      return [name[0].toUpperCase() + name.slice(1), place, others, ': ', sentence(text), ' '];
+    });
 }
 
 /** {longest, start, outside} of the runs of timestamps with an error outside 3 sigma. */
@@ -145,8 +131,9 @@ function excursionOf(error, sigma) {
   return result;
 }
 
-/** The element whose error was outside 3 sigma for the longest time. */
-function describeExcursion(e, say) {
+/** The element whose error was outside 3 sigma for the longest time; empty if there is none. */
+function excursionText(e) {
+  if (verdictOf(e).cls === 'bad') return [];
   const times = columnOf(e.t);
   let worst = null;
   for (const block of e.blocks)
@@ -157,24 +144,24 @@ function describeExcursion(e, say) {
       if (found.longest < 5 || share <= 0.02 || (worst && found.longest <= worst.longest)) return;
       worst = {...found, share, name: [block.name, block.tangent[k]].filter(Boolean).join('.')};
     });
-  if (!worst) return;
-  say(
-    'warn',
-    '↕',
-    `the error of ${worst.name} is outside 3σ at ${plural(worst.outside, 'timestamp')} `,
+  if (!worst) return [];
+  const text = [
+    `The error of ${worst.name} is outside 3σ at ${plural(worst.outside, 'timestamp')} `,
     `(${percent(worst.share)}, 0.3 % expected), for the longest time from `,
     timeLink(times[worst.start]),
     ' to ',
     timeLink(times[worst.start + worst.longest - 1]),
-  );
+    '. ',
+  ];
+  return [text];
 }
 
 const norm = (columns, i) => Math.sqrt(sum(columns.map((column) => column[i] * column[i])));
 
 /** The largest sudden decrease of the position sigma: a loop was closed, or a first fix came. */
-function describeFix(e, say) {
+function fixText(e) {
   const block = e.blocks.find((b) => b.name === e.position);
-  if (!block || !block.sigma.length || e.smoothed) return;
+  if (!block || !block.sigma.length || e.smoothed) return [];
   const times = columnOf(e.t);
   const sigma = block.sigma.map(columnOf);
   const error = block.error.map(columnOf);
@@ -184,49 +171,12 @@ function describeFix(e, say) {
     const ratio = norm(sigma, i) / norm(sigma, i - 1);
     if (ratio < best) [best, index] = [ratio, i];
   }
-  if (index < 0) return;
+  if (index < 0) return [];
   const fall = (columns) =>
     `from ${withUnit(norm(columns, index - 1), 'm')} to ${withUnit(norm(columns, index), 'm')}`;
-  say(
-    'good',
-    '⟲',
-    'at ',
-    timeLink(times[index]),
-    ` (a loop closure or a first fix) the position σ fell ${fall(sigma)}`,
-    error.length ? `, and the error ${fall(error)}` : '',
-  );
-}
-
-/** The longest time without a measurement that was used. */
-function describeGap(e, say) {
-  const used = [];
-  for (const innovation of e.innovations) {
-    const times = columnOf(innovation.t);
-    const outcomes = columnOf(innovation.outcome);
-    const isCounted = innovation.landmark === undefined ? isUsed : isAccepted;
-    for (let i = 0; i < times.length; i++) if (isCounted(outcomes[i])) used.push(times[i]);
-  }
-  if (!used.length || e.smoothed) return;
-  used.sort((a, b) => a - b);
-  used.push(page.full[1]);
-  let longest = 0;
-  let start = 0;
-  let previous = page.full[0];
-  for (const time of used) {
-    if (time - previous > longest) [longest, start] = [time - previous, previous];
-    previous = time;
-  }
-  if (longest <= 0.12 * (page.full[1] - page.full[0])) return;
-  const end = start + longest;
-  say(
-    'warn',
-    '…',
-    'no measurement was used from ',
-    timeLink(start),
-    ' to ',
-    timeLink(end),
-    `: the filter predicted for ${numberText(longest)} s`,
-  );
+  const errors = error.length ? `, and the error ${fall(error)}` : '';
+  const text = ` (a loop closure or a first fix) the position σ fell ${fall(sigma)}${errors}. `;
+  return [['At ', timeLink(times[index]), text]];
 }
 
 /** Errors of the best estimator in each segment of the config. */

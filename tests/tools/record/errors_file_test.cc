@@ -76,10 +76,11 @@ TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
   EXPECT_EQ(lines[0],
             "t_s,cam.position.0,cam.position.1,sigma:cam.position.0,sigma:cam.position.1,"
             "cam.orientation.rx,cam.orientation.ry,cam.orientation.rz,sigma:cam.orientation.rx,"
-            "sigma:cam.orientation.ry,sigma:cam.orientation.rz,cam.heading,sigma:cam.heading");
-  EXPECT_EQ(lines[1], "0.500000000,,,,,,,,,,,,");
+            "sigma:cam.orientation.ry,sigma:cam.orientation.rz,cam.heading,sigma:cam.heading,"
+            "nees:cam");
+  EXPECT_EQ(lines[1], "0.500000000,,,,,,,,,,,,,");
   const std::vector<std::string> cells = Cells(lines[2]);
-  ASSERT_EQ(cells.size(), 13u);
+  ASSERT_EQ(cells.size(), 14u);
   EXPECT_EQ(cells[1] + ' ' + cells[2], "0.25 -0.5");  // the errors are in m
   EXPECT_EQ(cells[3] + ' ' + cells[4], "0.5 2");
   EXPECT_NEAR(std::stod(cells[5]), 0.2, 1e-12);  // the error is in rad and in the frame of the body
@@ -88,7 +89,10 @@ TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
   // The error is wrapped to (-pi, pi].
   EXPECT_NEAR(std::stod(cells[11]), 6.2 - 2.0 * std::acos(-1.0), 1e-12);
   EXPECT_EQ(cells[12], "");
+  // The heading is constant. NEES = (0.25^2 / 0.25 + 0.5^2 / 4 + 0.2^2 / 1e-4) / 5
+  EXPECT_NEAR(std::stod(cells[13]), (0.25 + 0.0625 + 400.0) / 5.0, 1e-9);
   EXPECT_EQ(Cells(lines[3])[1] + ' ' + Cells(lines[3])[3], " 0.5");
+  EXPECT_NEAR(std::stod(Cells(lines[3])[13]), 400.0 / 3.0, 1e-9);  // the position is unknown
 }
 
 TEST_F(ErrorsOfACamera, IsDrawnInItsBandAndOrientationsInDegrees) {

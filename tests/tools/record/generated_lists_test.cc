@@ -140,6 +140,8 @@ TEST(GeneratedLists, AreInTheDocumentation) {
   ExpectList(page, "implied_states.csv", ColumnList(internal::kImpliedColumns));
   ExpectList(page, "estimates.csv", ColumnList(internal::kEstimateColumns));
   ExpectList(page, "errors.csv", ColumnList(internal::kErrorColumns));
+  ExpectList(page, "owners of errors.csv", ColumnList(internal::kOwnerColumns));
+  ExpectList(page, "final_covariance.csv", ColumnList(internal::kCovarianceColumns));
   ExpectList(page, "innovations.csv", ColumnList(internal::kInnovationColumns));
   ExpectList(page, "gains.csv", ColumnList(internal::kGainColumns));
   ExpectList(page, "reprojection.csv", ColumnList(internal::kReprojectionColumns));

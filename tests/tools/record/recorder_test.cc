@@ -21,31 +21,34 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 TEST(Recorder, WritesEveryFile) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "above" / "out"));
-  EXPECT_EQ(FilesIn(folder / "above" / "out"), (std::vector<std::string>{"alone/errors.csv",
-                                                                         "alone/estimates.csv",
-                                                                         "alone/events.csv",
-                                                                         "alone/gains.csv",
-                                                                         "alone/innovations.csv",
-                                                                         "columns.json",
-                                                                         "comparison.csv",
-                                                                         "config.resolved.yaml",
-                                                                         "ekf/errors.csv",
-                                                                         "ekf/estimates.csv",
-                                                                         "ekf/events.csv",
-                                                                         "ekf/gains.csv",
-                                                                         "ekf/innovations.csv",
-                                                                         "expected.csv",
-                                                                         "files.txt",
-                                                                         "implied_states.csv",
-                                                                         "log.txt",
-                                                                         "measurements.csv",
-                                                                         "report.html",
-                                                                         "run.json",
-                                                                         "timing.csv",
-                                                                         "timing.json",
-                                                                         "truth.csv"}));
+  EXPECT_EQ(FilesIn(folder / "above" / "out"),
+            (std::vector<std::string>{"alone/errors.csv",
+                                      "alone/estimates.csv",
+                                      "alone/events.csv",
+                                      "alone/final_covariance.csv",
+                                      "alone/gains.csv",
+                                      "alone/innovations.csv",
+                                      "columns.json",
+                                      "comparison.csv",
+                                      "config.resolved.yaml",
+                                      "ekf/errors.csv",
+                                      "ekf/estimates.csv",
+                                      "ekf/events.csv",
+                                      "ekf/final_covariance.csv",
+                                      "ekf/gains.csv",
+                                      "ekf/innovations.csv",
+                                      "expected.csv",
+                                      "files.txt",
+                                      "implied_states.csv",
+                                      "log.txt",
+                                      "measurements.csv",
+                                      "report.html",
+                                      "run.json",
+                                      "timing.csv",
+                                      "timing.json",
+                                      "truth.csv"}));
   // There are no files outside the folder of the run.
-  EXPECT_EQ(FilesIn(folder.path()).size(), 23u);
+  EXPECT_EQ(FilesIn(folder.path()).size(), 25u);
 }
 
 TEST(Recorder, ColumnsJsonHasTheHeaderOfEveryCsvFile) {

@@ -273,9 +273,8 @@ struct OwnerLayout {
 /// Columns of errors.csv for each owner, after those of the blocks.
 inline constexpr std::array kOwnerColumns = std::to_array<ColumnInfo<OwnerLayout, BlockRow>>({
     {"nees", "",
-     "NEES e' P^-1 e of the blocks of the owner, divided by its degrees of freedom; its mean is "
-     "the "
-     "metric `nees.mean:OWNER`; empty if the NEES is unknown",
+     "NEES of the blocks of the owner, divided by its degrees of freedom; empty if the NEES is "
+     "unknown. The mean is the metric `nees.mean:OWNER`",
      [](const OwnerLayout& owner, const BlockRow& row, CsvFile& file) {
        std::vector<Eigen::VectorXd> errors;
        errors.reserve(owner.blocks.size());  // BlockError refers to the elements

@@ -15,7 +15,7 @@ namespace alidade::internal {
 ///
 ///   e      = x (-) x_true    error, in the tangent space at the estimate
 ///   sigma  = sqrt(P_ii)      standard deviation of the estimate, without that of the truth
-///   nees   = e' P^-1 e / n   of all n elements of the owner, see JointNees
+///   nees   = e' C^-1 e / n   of the n elements of all blocks of the owner, see JointNees
 ///
 /// e is computed as -(x_true (-) x), which equals x (-) x_true for vectors, angles and rotations.
 /// The error of a rotation is expressed in the body frame, in rad.

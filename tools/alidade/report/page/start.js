@@ -116,7 +116,6 @@ function start() {
 }
 
 /** For tests of the page. */
-window.alidadeReport = {page, plots, chi2inv, quantiles, wilson, redraw, zoomTo, toggle, setTheme};
-window.alidadeReport.exportSvg = exportSvg;
+window.alidadeReport = {page, plots, run: RUN, columnOf, setTheme};
 
 start();

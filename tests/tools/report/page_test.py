@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""tests/tools/report/page_test.py PROGRAM EXAMPLES
+"""tests/tools/report/page_test.py PROGRAM EXAMPLES [TEST...]
 
 Opens pages of `alidade report` in headless Chromium and uses them. PROGRAM is the program alidade,
 EXAMPLES the folder of the examples. Exits with 77, which means skipped, if Chromium, its driver or
@@ -74,13 +74,12 @@ class PageTest(unittest.TestCase):
         cls.root = Path(cls.folder.name)
         options = Options()
         for argument in ("headless=new", "no-sandbox", "disable-gpu", "force-device-scale-factor=1",
-                         "disable-background-networking", "host-resolver-rules=MAP * ~NOTFOUND"):
+                         "hide-scrollbars", "window-size=1280,900"):
             options.add_argument("--" + argument)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
         cls.browser = webdriver.Chrome(service=Service(shutil.which("chromedriver")),
                                        options=options)
-        cls.browser.set_window_size(1280, 900)
-        cls.browser.set_script_timeout(120)
+        cls.browser.set_script_timeout(300)
 
     @classmethod
     def tearDownClass(cls):
@@ -99,7 +98,8 @@ class PageTest(unittest.TestCase):
         page = self.root / (name + ".html")
         written = self.alidade("report", folder, "-o", page)
         self.assertEqual(written.returncode, 0, written.stderr)
-        self.browser.get_log("performance")
+        for kind in ("browser", "performance"):
+            self.browser.get_log(kind)  # drops the messages of the previous page
         self.browser.get(page.as_uri())
         self.browser.execute_script(DRAW_ALL)
         return folder
@@ -154,7 +154,7 @@ class PageTest(unittest.TestCase):
             return values.reduce((a, b) => a + b, 0) / values.length;
             """, estimator["name"], nees["owner"])
         expected = estimator["metrics"]["nees.mean:" + nees["owner"]]
-        self.assertAlmostEqual(mean / expected, 1.0, places=4)
+        self.assertAlmostEqual(mean, expected, delta=1e-4 * expected)
 
     def test_slam_run(self):
         self.open("slam", "run", "10_slam_scene/config.yaml", "--no-figures")
@@ -168,7 +168,7 @@ class PageTest(unittest.TestCase):
         self.assertAlmostEqual(self.script("return alidadeReport.page.time"), sum(full) / 2, 2)
 
     def test_comparison(self):
-        self.open("comparison", "compare", "05_depth_principled/config.yaml", "--no-figures")
+        self.open("comparison", "compare", "05_depth_principled/config.yaml")
         self.expect_sound()
         self.assertTrue(self.browser.find_elements(By.ID, "comparison"))
 
@@ -228,7 +228,6 @@ class PageTest(unittest.TestCase):
         self.assertIn("0.2,x7", text)
 
     def test_narrow_and_dark(self):
-        self.browser.set_window_size(500, 900)
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
             "width": 390, "height": 900, "deviceScaleFactor": 1, "mobile": False})
         try:
@@ -237,8 +236,7 @@ class PageTest(unittest.TestCase):
             self.expect_sound()
         finally:
             self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-            self.browser.set_window_size(1280, 900)
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:])

@@ -91,7 +91,7 @@ function rankItem(add) {
       nameOf(second.name),
       '.',
     ],
-    'This is one seed; `alidade sweep --runs 100` shows whether the difference is chance.',
+    'This is one seed; alidade sweep --runs 100 shows whether the difference is chance.',
   );
 }
 

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of the figures: size, fonts, bytes, and texts that do not overlap."""
+import json
+import re
+import shutil
+import subprocess
+import sys
+import unittest
+from unittest import mock
+
+try:
+    import matplotlib  # noqa: F401
+    import numpy as np
+except ImportError:
+    raise unittest.SkipTest("the package matplotlib or numpy is not installed") from None
+
+from folders import NAMES, Folders
+from matplotlib.text import Text
+
+import alidade
+from alidade import plots
+from alidade.plots.chi_square import quantile
+from alidade.plots.options import Options
+from alidade.plots.style import paper
+
+FIGURES = [
+    ("run", "state"),
+    ("run", "errors"),
+    ("run", "nis"),
+    ("run", "comparison"),
+    ("compare", "errors"),
+    ("compare", "comparison"),
+    ("seeds", "errors"),
+    ("seeds", "nees"),
+    ("seeds", "comparison"),
+    ("sweep", "sweep"),
+    ("sweep", "comparison"),
+    ("vary", "sweep"),
+]
+
+
+def texts_of(figure):
+    """Returns all drawn texts of a figure with their boxes in pixels."""
+    drawn = []
+
+    def draw(text, renderer):
+        if text.get_visible() and text.get_text().strip():
+            drawn.append((text.get_text(), text.get_window_extent(renderer)))
+
+    with paper():
+        figure.draw_without_rendering()  # places legend and panels
+        with mock.patch.object(Text, "draw", draw):
+            figure.draw(figure.canvas.get_renderer())
+    return drawn
+
+
+class PlotsTest(Folders):
+    def figure(self, folder, plot, **options):
+        return plots.figure(self.root / folder, plot, Options(**options))
+
+    def test_texts_do_not_overlap_and_are_inside(self):
+        for folder, plot in FIGURES:
+            for columns in (1, 2):
+                figure = self.figure(folder, plot, columns=columns)
+                texts = texts_of(figure)
+                for i, (text, box) in enumerate(texts):
+                    case = f"{folder} {plot} {columns}: {text!r}"
+                    self.assertGreaterEqual(box.x0, -1, case)
+                    self.assertLessEqual(box.x1, figure.bbox.width + 1, case)
+                    for other, second in texts[:i]:
+                        self.assertFalse(box.padded(-0.5).overlaps(second), f"{case}, {other!r}")
+
+    def test_axes_are_labelled_with_units(self):
+        axes = self.figure("run", "errors").axes
+        self.assertEqual([a.get_ylabel() for a in axes], ["error [m]", "error [m/s]"])
+        self.assertEqual(axes[-1].get_xlabel(), "time [s]")
+        panel = self.figure("sweep", "sweep", metrics=["rmse:target.depth"]).axes[0]
+        self.assertEqual(panel.get_xlabel(), "rmse target.depth [m]")
+
+    def test_the_legend_shows_every_name(self):
+        texts = [text for text, _ in texts_of(self.figure("run", "nis"))]
+        for name in (*NAMES, "not accepted", "95 % bounds"):
+            self.assertIn(name, texts)
+
+    def test_labels_replace_names(self):
+        figure = self.figure("run", "errors", estimators=["1e5", "_ekf"], labels=["$U$", "E"])
+        legend = [text.get_text() for text in figure.legends[0].get_texts()]
+        self.assertEqual(legend[:2], [r"\$U\$", "E"])
+        with self.assertRaisesRegex(alidade.AlidadeError, "--labels has 1 names; expected 3"):
+            self.figure("run", "errors", labels=["E"])
+
+    def test_errors_are_those_of_the_file(self):
+        line = self.figure("run", "errors", estimators=["_ekf"], start=1, end=2).axes[0].lines[-1]
+        table = alidade.Run(self.root / "run")["_ekf"].errors
+        rows = (table["t_s"] >= 1) & (table["t_s"] <= 2)
+        np.testing.assert_array_equal(line.get_ydata(), table["target.depth"][rows])
+
+    def test_rejected_measurements_are_marked(self):
+        lines = self.figure("run", "nis", estimators=["_ekf"]).axes[0].lines
+        marked = sum(len(line.get_xdata()) for line in lines if line.get_marker() == "x")
+        table = alidade.Run(self.root / "run")["_ekf"].innovations
+        self.assertEqual(marked, (table["outcome"] == "gated").sum())
+        self.assertGreater(marked, 0)
+
+    def test_blocks_are_selected(self):
+        figure = self.figure("run", "state", blocks=["*.depth"])
+        self.assertEqual([a.get_title(loc="left") for a in figure.axes], ["target.depth"])
+        with self.assertRaisesRegex(alidade.AlidadeError, "nothing to draw"):
+            self.figure("run", "state", blocks=["nothing"])
+
+    def test_nees_needs_its_columns(self):
+        with self.assertRaisesRegex(alidade.AlidadeError, "a later version of alidade than 0"):
+            self.figure("run", "nees")
+
+    def test_nees_of_a_run_is_drawn_if_it_has_columns(self):
+        folder = self.root / "with_nees"
+        shutil.copytree(self.root / "run", folder)
+        columns = json.loads((folder / "columns.json").read_text())
+        columns["_ekf/errors.csv"].append(
+            {"name": "nees:target", "quantity": "nees", "subject": "target"}
+        )
+        (folder / "columns.json").write_text(json.dumps(columns))
+        header, *rows = (folder / "_ekf/errors.csv").read_text().splitlines()
+        lines = [header + ",nees:target", *(f"{row},{1 + i}" for i, row in enumerate(rows))]
+        (folder / "_ekf/errors.csv").write_text("\n".join(lines) + "\n")
+        axis = self.figure("with_nees", "nees").axes[0]
+        np.testing.assert_array_equal(axis.lines[-1].get_ydata(), np.arange(1, len(rows) + 1))
+        bounds = sorted(line.get_ydata()[0] for line in axis.lines[:2])
+        np.testing.assert_allclose(bounds, [0.0506356, 7.3777589], rtol=1e-6)  # 2 dof
+
+    def test_quantiles_are_those_of_tables(self):
+        for share, dof, x in (
+            (0.95, 1, 3.841458821),
+            (0.025, 3, 0.215795283),
+            (0.975, 12, 23.336664),
+            (0.999, 100, 149.449253),
+        ):
+            self.assertAlmostEqual(quantile(share, dof), x, delta=1e-6 * x)
+
+    def test_bytes_are_reproducible_and_fonts_can_be_embedded(self):
+        for suffix in plots.FORMATS:
+            files = [self.root / f"first{suffix}", self.root / f"second{suffix}"]
+            for file in files:
+                plots.save(self.figure("run", "errors"), file)
+            first, second = (file.read_bytes() for file in files)
+            self.assertEqual(first, second, suffix)
+            self.assertNotIn(b"CreationDate", first)
+        pdf = (self.root / "first.pdf").read_bytes()
+        self.assertIn(b"/CIDFontType2", pdf)
+        self.assertNotIn(b"/Type3", pdf)
+        width = float(re.search(rb"/MediaBox \[ 0 0 (\S+)", pdf).group(1))
+        self.assertAlmostEqual(width, 252)  # 3.5 in
+
+    def test_an_unknown_format_is_an_error(self):
+        with self.assertRaisesRegex(alidade.AlidadeError, "expected .pdf .svg .png"):
+            plots.save(self.figure("run", "errors"), self.root / "figure.jpg")
+
+
+class ProgramTest(Folders):
+    def call(self, *arguments):
+        return subprocess.run(
+            [sys.executable, "-m", "alidade", *map(str, arguments)],
+            cwd=self.root,
+            capture_output=True,
+            text=True,
+        )
+
+    def test_plot_writes_a_figure(self):
+        done = self.call("plot", "run", "errors", "--estimators=--help,1e5", "-o", "e.pdf")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertTrue((self.root / "e.pdf").read_bytes().startswith(b"%PDF"))
+
+    def test_table_prints_a_table(self):
+        done = self.call("table", "run", "--latex", "--metrics", "rmse:*")
+        self.assertEqual(done.returncode, 0)
+        self.assertIn(r"\_ekf & 0.", done.stdout)
+
+    def test_an_error_is_one_line(self):
+        done = self.call("plot", "nothing", "errors", "-o", "e.pdf")
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertEqual(done.stderr, "error: nothing: this folder does not exist\n")
+        done = self.call("plot", "run", "errors", "-o", "none/e.pdf")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("none/e.pdf: cannot write this file: No such file", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -28,6 +28,24 @@ estimators:
   "1e5": {type: ukf, gate: 0.999}
   "--help": {type: rts, gate: 0.999}
 """
+POSES = """
+alidade: 1
+state:
+  body:
+    model: quaternion_pose
+    noise: {kind: continuous, linear_acceleration: 0.5, angular_acceleration: 0.5}
+    initial:
+      position: {mean: [0, 0, 0], sigma: 0.2}
+      orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0.2}
+      velocity: {mean: [0, 1, 2], sigma: 0.3}
+      angular_velocity: {mean: [0, 0, 0.5], sigma: 0.3}
+sensors:
+  mocap:
+    {model: pose, stream: pose, roles: {position: body.position, orientation: body.orientation},
+     sigma_position_m: 0.05, sigma_orientation_rad: 0.02}
+source: {type: models, seed: 1, duration_s: 5, rate_hz: 10}
+estimators: {ekf: {type: ekf}}
+"""
 NAMES = ["_ekf", "1e5", "--help"]
 STREAM = 'left, "right" $\\sigma$'
 
@@ -42,7 +60,7 @@ def alidade(*arguments: str, folder: Path) -> None:
 
 
 class Folders(unittest.TestCase):
-    """A test with the folders `run`, `sweep`, `vary`, `compare` and `seeds`."""
+    """A test with the folders `run`, `poses`, `sweep`, `vary`, `compare` and `seeds`."""
 
     @classmethod
     def setUpClass(cls) -> None:
@@ -50,9 +68,11 @@ class Folders(unittest.TestCase):
         cls.addClassCleanup(cls._temporary.cleanup)
         cls.root = Path(cls._temporary.name)
         (cls.root / "config.yaml").write_text(CONFIG)
+        (cls.root / "poses.yaml").write_text(POSES)
         compare = ("compare", "config.yaml", "--no-decomposition", "--quiet")
         for arguments in (
             ("run", "config.yaml", "--no-figures", "--quiet", "--covariances", "-o", "run"),
+            ("run", "poses.yaml", "--no-figures", "--quiet", "--covariances", "-o", "poses"),
             ("sweep", "config.yaml", "--runs", "5", "--quiet", "-o", "sweep"),
             ("sweep", "config.yaml", "--runs", "3", "--quiet", "-o", "vary",
              "--vary", "source.duration_s=1,2,3"),

@@ -27,6 +27,8 @@ FIGURES = [
     ("run", "state"),
     ("run", "errors"),
     ("run", "nis"),
+    ("poses", "errors"),
+    ("poses", "trajectory"),
     ("run", "comparison"),
     ("compare", "errors"),
     ("compare", "comparison"),
@@ -58,17 +60,26 @@ class PlotsTest(Folders):
     def figure(self, folder, plot, **options):
         return plots.figure(self.root / folder, plot, Options(**options))
 
+    def expect_legible(self, figure, case):
+        """Expects that texts are inside the figure and do not overlap."""
+        texts = texts_of(figure)
+        for i, (text, box) in enumerate(texts):
+            self.assertGreaterEqual(box.x0, -1, f"{case}: {text!r}")
+            self.assertLessEqual(box.x1, figure.bbox.width + 1, f"{case}: {text!r}")
+            for other, second in texts[:i]:
+                overlap = box.padded(-0.5).overlaps(second)
+                self.assertFalse(overlap, f"{case}: {text!r}, {other!r}")
+
     def test_texts_do_not_overlap_and_are_inside(self):
         for folder, plot in FIGURES:
             for columns in (1, 2):
                 figure = self.figure(folder, plot, columns=columns)
-                texts = texts_of(figure)
-                for i, (text, box) in enumerate(texts):
-                    case = f"{folder} {plot} {columns}: {text!r}"
-                    self.assertGreaterEqual(box.x0, -1, case)
-                    self.assertLessEqual(box.x1, figure.bbox.width + 1, case)
-                    for other, second in texts[:i]:
-                        self.assertFalse(box.padded(-0.5).overlaps(second), f"{case}, {other!r}")
+                self.expect_legible(figure, f"{folder} {plot} {columns}")
+
+    def test_many_panels_need_two_columns(self):
+        self.expect_legible(self.figure("poses", "state", columns=2), "poses state")
+        with self.assertRaisesRegex(alidade.AlidadeError, "13 panels do not fit on a page"):
+            self.figure("poses", "state", columns=1)
 
     def test_axes_are_labelled_with_units(self):
         axes = self.figure("run", "errors").axes
@@ -107,6 +118,42 @@ class PlotsTest(Folders):
         self.assertEqual([a.get_title(loc="left") for a in figure.axes], ["target.depth"])
         with self.assertRaisesRegex(alidade.AlidadeError, "nothing to draw"):
             self.figure("run", "state", blocks=["nothing"])
+
+    def test_a_trajectory_has_the_axes_with_the_largest_range(self):
+        axis = self.figure("poses", "trajectory").axes[0]
+        position = alidade.Run(self.root / "poses")["ekf"].estimates["body.position"]
+        np.testing.assert_array_equal(axis.lines[0].get_xydata(), position[:, 1:])
+        self.assertEqual((axis.get_xlabel(), axis.get_ylabel()), ("y [m]", "z [m]"))
+        self.assertEqual(axis.get_aspect(), 1)
+        other = self.figure("poses", "trajectory", axes=["z", "x"]).axes[0]
+        np.testing.assert_array_equal(other.lines[0].get_xydata(), position[:, [2, 0]])
+        with self.assertRaisesRegex(alidade.AlidadeError, "expected two of x, y, z"):
+            self.figure("poses", "trajectory", axes=["x", "w"])
+
+    def test_ellipses_are_those_of_the_covariance(self):
+        (ellipses,) = self.figure("poses", "trajectory", axes=["x", "y"]).axes[0].collections
+        run = alidade.Run(self.root / "poses")["ekf"]
+        variances = np.linalg.eigvalsh(run.covariance[0, :2, :2])
+        lengths = sorted([2 * ellipses._heights[0], 2 * ellipses._widths[0]])
+        np.testing.assert_allclose(lengths, 6 * np.sqrt(variances))
+
+    def test_a_map_has_landmarks_with_ellipses(self):
+        folder = self.root / "map"
+        shutil.copytree(self.root / "poses", folder)
+        (folder / "ekf/covariance.bin").unlink()
+        names = "x y z sigma_x sigma_y sigma_z true_x true_y true_z cov_xy cov_xz cov_yz status"
+        columns = json.loads((folder / "columns.json").read_text())
+        columns["ekf/landmarks.csv"] = [{"name": n, "quantity": n} for n in names.split()]
+        (folder / "columns.json").write_text(json.dumps(columns))
+        header = names.replace(" ", ",")
+        kept, removed = "3,4,5,0.1,0.3,0.2,,,,0,0,0,kept", "9,9,9,1,1,1,,,,0,0,0,removed"
+        (folder / "ekf/landmarks.csv").write_text(f"{header}\n{kept}\n{removed}\n")
+        axis = self.figure("map", "trajectory", axes=["x", "y"]).axes[0]
+        np.testing.assert_array_equal(axis.lines[0].get_xydata(), [[3, 4]])
+        (ellipses,) = axis.collections
+        np.testing.assert_allclose(2 * ellipses._widths, 6 * 0.3)
+        np.testing.assert_allclose(2 * ellipses._heights, 6 * 0.1)
+        np.testing.assert_allclose(np.degrees(ellipses._angles) % 180, 90)
 
     def test_nees_needs_its_columns(self):
         with self.assertRaisesRegex(alidade.AlidadeError, "a later version of alidade than 0"):

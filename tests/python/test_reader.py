@@ -50,6 +50,14 @@ class ReaderTest(Folders):
         self.assertEqual(set(table["outcome"]), {"accepted", "gated"})
         self.assertEqual(table["nis"].dtype, float)
 
+    def test_an_empty_cell_is_nan_or_an_empty_text(self):
+        path = self.root / "table.csv"
+        path.write_text('t_s,text\n,"a ""b"",\nc"\n1,\n')
+        columns = [{"name": "t_s", "quantity": "t_s"}, {"name": "text", "quantity": "text"}]
+        table = alidade.Table(path, columns)
+        np.testing.assert_array_equal(table["t_s"], [np.nan, 1])
+        self.assertEqual(list(table["text"]), ['a "b",\nc', ""])
+
     def test_estimators_have_the_order_of_the_config(self):
         self.assertEqual(list(self.run_folder), NAMES)
         self.assertEqual(alidade.Sweep(self.root / "sweep").estimators, NAMES)

@@ -46,7 +46,7 @@ def parser() -> argparse.ArgumentParser:
     plot.add_argument("--blocks", type=names, default=[], metavar="A,B",
                       help="patterns of blocks, elements, state entries or sensors")  # fmt: skip
     plot.add_argument("--axes", type=names, default=[], metavar="X,Y",
-                      help="axes of a trajectory; default: the two with the largest range")  # fmt: skip
+                      help="axes of a trajectory; default: those of the largest ranges")  # fmt: skip
     plot.add_argument("--from", type=float, default=float("-inf"), dest="start", metavar="T",
                       help="first timestamp [s]")  # fmt: skip
     plot.add_argument("--to", type=float, default=float("inf"), dest="end", metavar="T",

@@ -14,7 +14,8 @@ import numpy as np
 
 # Kinds of columns that contain text. All other columns contain numbers.
 TEXT_QUANTITIES = frozenset(
-    "stream sensor landmark outcome kind text id representation status estimator verdict".split()
+    "stream sensor landmark outcome kind text id representation status element estimator "
+    "verdict".split()
 )
 
 

@@ -173,7 +173,7 @@ class PlotsTest(Folders):
         axis = self.figure("with_nees", "nees").axes[0]
         np.testing.assert_array_equal(axis.lines[-1].get_ydata(), np.arange(1, len(rows) + 1))
         bounds = sorted(line.get_ydata()[0] for line in axis.lines[:2])
-        np.testing.assert_allclose(bounds, [0.0506356, 7.3777589], rtol=1e-6)  # 2 dof
+        np.testing.assert_allclose(bounds, [0.0253178, 3.6888795], rtol=1e-6)  # 2 dof
 
     def test_quantiles_are_those_of_tables(self):
         for share, dof, x in (

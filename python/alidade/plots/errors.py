@@ -14,7 +14,7 @@ from .style import TimeAxis, degrees, label_value, legend, line, panels, styles
 
 
 def draw(path: Path, options: Options) -> Figure:
-    """Draws the errors of a run. For a comparison over seeds, draws the RMS errors over the runs."""
+    """Draws the errors of a run, or the RMS errors over the runs of a comparison over seeds."""
     return (draw_rms if is_over_seeds(path) else draw_run)(path, options)
 
 

@@ -50,7 +50,7 @@ def draw(path: Path, options: Options) -> Figure:
     times = [s.t_s for entries in series.values() for s in entries.values()]
     time = TimeAxis(np.concatenate(times), options)
     for axis, owner in zip(axes, owners):
-        label_value(axis, "ANEES" if over_runs else "NEES", "")
+        label_value(axis, "ANEES" if over_runs else "NEES / dof", "")
         present = {name: entries[owner] for name, entries in series.items() if owner in entries}
         bounds = next(iter(present.values()))
         largest = max(largest_of(s.nees[options.during(s.t_s)]) for s in present.values())
@@ -66,16 +66,17 @@ def draw(path: Path, options: Options) -> Figure:
 
 
 def values(run: Run, name: str) -> dict[str, Series]:
-    """Returns the NEES e' C^-1 e of each state entry of an estimator."""
+    """Returns the NEES / dof of each state entry of an estimator. The bounds are those of the mean
+    number of degrees of freedom."""
     table = run[name].errors
-    return {
-        table.subject(column): Series(
-            table["t_s"],
-            table[column],
-            *bounds_of(run[name].metrics[f"nees.dof:{table.subject(column)}"]),
-        )
-        for column in table.of("nees")
-    }
+    series = {}
+    for column in table.of("nees"):
+        owner = table.subject(column)
+        dof = run[name].metrics.get(f"nees.dof:{owner}")
+        if dof:
+            low, high = bounds_of(dof)
+            series[owner] = Series(table["t_s"], table[column], low / dof, high / dof)
+    return series
 
 
 def averages(comparison: Comparison, name: str) -> dict[str, Series]:

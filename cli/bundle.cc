@@ -177,10 +177,8 @@ ExitCode RunBundle(const BundleArguments& arguments) {
   for (const std::string& line : DescribeUndetermined(file.problem, *sensor, result))
     text += line + '\n';
   if (folder && result.end != BundleEnd::kFailed) {
-    const std::vector<std::string> names = folder->Save(file, result, rms_before, rms_after);
-    text += "wrote " + arguments.folder + '\n';
-    for (const std::string& name : names)
-      text += "  " + (std::filesystem::path(arguments.folder) / name).string() + '\n';
+    folder->Save(file, result, rms_before, rms_after);
+    text += ReportLine(arguments.folder);
   }
   if (!arguments.quiet) Print(text);
   if (result.end == BundleEnd::kFailed) PrintErrors(arguments.problem + ": " + result.message);

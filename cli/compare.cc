@@ -42,7 +42,7 @@ struct CompareArguments {
   CompareOptions options;
   bool all = false;
   bool no_decomposition = false, json = false, markdown = false, latex = false;
-  bool force = false, quiet = false, figures = false;
+  bool force = false, quiet = false;
 };
 
 std::string FormatComparison(const Comparison& comparison, const CompareArguments& arguments) {
@@ -53,11 +53,13 @@ std::string FormatComparison(const Comparison& comparison, const CompareArgument
                        arguments.all ? ReportRows::kAll : ReportRows::kMain);
 }
 
-/// Prints the comparison, and the path of the folder that contains the comparison.
+/// Prints the comparison, and the path of the page in the folder of the comparison. The output in
+/// another format than text contains only the comparison.
 void Report(const Comparison& comparison, const CompareArguments& arguments,
             const fs::path& folder) {
-  Print(FormatComparison(comparison, arguments));
-  if (!folder.empty() && !arguments.quiet) PrintNote("wrote " + folder.string());
+  const bool is_text = !arguments.json && !arguments.markdown && !arguments.latex;
+  const bool has_report = is_text && !folder.empty() && !arguments.quiet;
+  Print(FormatComparison(comparison, arguments) + (has_report ? ReportLine(folder) : ""));
 }
 
 /// Returns the exit code of the command. If the comparison is withheld, prints the reason. The code
@@ -140,12 +142,39 @@ class Forecast {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
+/// Returns the command with the options that affect the contents of the folder.
+std::vector<std::string> ArgumentsOf(const CompareArguments& arguments) {
+  const CompareOptions& options = arguments.options;
+  std::vector<std::string> list = {"compare"};
+  const auto add = [&](const char* option, const std::string& value) {
+    if (!value.empty()) list.insert(list.end(), {option, value});
+  };
+  if (options.over_seeds) {
+    add("--runs", std::to_string(arguments.sweep.runs));
+    add("--first-seed", std::to_string(arguments.seed.value_or(arguments.sweep.first_seed)));
+  }
+  add("--reference", options.reference);
+  add("--filter", options.filter);
+  if (options.full_information != FullInformation::kIfFast) {
+    const bool is_always = options.full_information == FullInformation::kAlways;
+    add("--full-information", is_always ? "always" : "never");
+  }
+  if (arguments.no_decomposition) list.emplace_back("--no-decomposition");
+  return list;
+}
+
+/// Returns the text of inputs.json. `config` contains the estimators that the comparison added.
+std::string InputsOf(const CompareArguments& arguments, const Config& config,
+                     const internal::PluginHashes& plugins) {
+  return arguments.input.InputsText(config, ArgumentsOf(arguments), {config}, plugins);
+}
+
 ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compared,
                     const PluginHost& host, const fs::path& folder) {
-  Recorder::Options record{folder, arguments.force, arguments.figures, arguments.command,
-                           StopRequested};
+  Recorder::Options record{folder, arguments.force, arguments.command};
   record.covariances = true;
   record.plugins = internal::HashFiles(internal::FindUsedPlugins({compared.config}, host));
+  record.inputs = InputsOf(arguments, compared.config, record.plugins);
   Recorder recorder(record, compared.config);
   RunComparer comparer(compared.experiment);
   Progress progress("frames", arguments.quiet);
@@ -204,6 +233,10 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExper
   };
   options.stop = StopRequested;
   SweepFolder sweep_folder(folder, arguments.force);
+  sweep_folder.AddFile(
+      internal::kInputsFile,
+      InputsOf(arguments, compared.config,
+               internal::HashFiles(internal::FindUsedPlugins({compared.config}, host))));
   ComparedSeeds seeds = CompareSeeds(compared, host, options, arguments.options);
   progress.Clear();
   Comparison& comparison = seeds.comparison;
@@ -215,11 +248,10 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExper
   }
   if (failed > 1) PrintErrors(std::to_string(failed) + " runs failed: see failures.csv");
   const bool has_results = !comparison.estimators.empty();  // false if no run has finished
-  std::string figure_note;
-  if (has_results) AddFiles(sweep_folder, comparison);
-  if (has_results)
-    figure_note = WriteSeedReport(sweep_folder.files(), comparison, compared.config, StopRequested);
-  if (!figure_note.empty()) Log(LogLevel::kWarning, "no figure was drawn: " + figure_note);
+  if (has_results) {
+    AddFiles(sweep_folder, comparison);
+    WriteSeedFiles(sweep_folder.files(), comparison);
+  }
   sweep_folder.Write(seeds.sweep, Summarise(seeds.sweep), compared.config);
   if (has_results) Report(comparison, arguments, folder);
   if (seeds.sweep.stopped && seeds.beyond_budget == 0) {
@@ -275,7 +307,7 @@ bool AreFolders(const std::vector<std::string>& paths) {
 /// Rejects the options that finished runs do not support.
 void RejectRunOptions(const CLI::App& command) {
   for (const char* option : {"--runs", "--first-seed", "--jobs", "--seed", "--set", "--plugin-path",
-                             "--allow-outside", "--figures", "--budget", "--full-information"}) {
+                             "--allow-outside", "--budget", "--full-information"}) {
     if (command.count(option) == 0) continue;
     throw CLI::ValidationError(option,
                                "finished runs do not support this option; expected a config");
@@ -356,8 +388,6 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
   command.add_flag("--latex", arguments.latex, "print the tables as LaTeX")
       ->excludes("--json")
       ->excludes("--markdown");
-  command.add_flag("--figures", arguments.figures, "also draw the figures of the run")
-      ->excludes("--runs");
   command.add_flag("--quiet", arguments.quiet, "print the comparison and errors only");
 }
 

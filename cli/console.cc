@@ -13,6 +13,7 @@
 #include <system_error>
 
 #include "alidade/base/error.h"
+#include "alidade/io/output_file.h"
 #include "alidade/io/utf8.h"
 #include "excerpt.h"
 
@@ -97,6 +98,17 @@ void Print(std::string_view text) {
   if (WriteAll(STDOUT_FILENO, text)) return;
   const std::string reason = std::generic_category().message(errno);
   throw Error(ExitCode::kIo, "<stdout>: cannot write: " + reason);
+}
+
+void WritePageFile(const std::filesystem::path& file, std::string_view page) {
+  internal::OutputFile output(file);
+  output.Write(page);
+  output.Close();
+}
+
+std::string ReportLine(std::filesystem::path path) {
+  if (std::filesystem::is_directory(path)) path /= "report.html";
+  return "\nreport   " + path.string() + '\n';
 }
 
 void PrintErrors(std::string_view text) {

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -16,6 +17,12 @@ void PrepareConsole();
 
 /// Writes `text` to standard output. Error: kIo if a byte cannot be written.
 void Print(std::string_view text);
+
+/// Writes a page to a file. Errors: kCannotCreate, kIo.
+void WritePageFile(const std::filesystem::path& file, std::string_view page);
+/// Returns an empty line and the line `report   PAGE`, the last line of a command that has written a
+/// page. PAGE is `path`, or `report.html` in it if `path` is a folder.
+std::string ReportLine(std::filesystem::path path);
 
 /// Prints `error: LINE` on standard error for each line. An indented line continues the line above.
 /// Each line that begins with a place in a file is followed by its Excerpt(), unless the line

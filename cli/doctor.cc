@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <unistd.h>
-
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <Eigen/Core>
@@ -134,24 +132,7 @@ void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
   CheckBatch(host, diagnosis);
 }
 
-bool IsOnPath(const char* program) {
-  const char* path = std::getenv("PATH");
-  std::string remaining = path == nullptr ? "" : path;
-  while (!remaining.empty()) {
-    const std::size_t end = std::min(remaining.find(':'), remaining.size());
-    if (::access((fs::path(remaining.substr(0, end)) / program).c_str(), X_OK) == 0) return true;
-    remaining.erase(0, end + 1);
-  }
-  return false;
-}
-
 void CheckEnvironment(Diagnosis& diagnosis) {
-  if (IsOnPath("gnuplot")) {
-    diagnosis.Ok("gnuplot is installed: runs draw figures");
-  } else {
-    diagnosis.Warn("gnuplot is not installed: runs do not draw figures",
-                   "apt-get install gnuplot-nox");
-  }
   const char* const data = std::getenv("ALIDADE_DATA");
   const std::string remedy = "export ALIDADE_DATA=FOLDER; FOLDER must contain kitti-depth-pairs";
   std::error_code error;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "alidade/evaluate/evaluation_page.h"
 #include "alidade/evaluate/report.h"
 #include "alidade/io/text_cell.h"
 #include "command.h"
@@ -21,6 +22,7 @@ constexpr const char* kEvalFooter = R"(Examples:
   alidade eval truth.tum mono.tum -as              also align the scale, for a single camera
   alidade eval KITTI_00_gt.txt KITTI_00_orb.txt -a -d 100 -u m --all-pairs
   alidade eval truth.tum a.tum b.tum -a --markdown
+  alidade eval truth.tum a.tum -a -o errors.html   write an interactive page
 
 Files: TUM (8 columns, or 20 with covariances), KITTI (12, and times.txt), EuRoC (csv, also of
 VINS-Mono and Kimera). A folder is a run, an estimator of a run, or an EuRoC sequence. Warnings are
@@ -39,6 +41,7 @@ struct EvalArguments {
   double max_diff_s = 0.01, offset_s = 0.0;
   std::string start_s, end_s;  ///< texts, because a double is not exact to the ns
   OutputFormat output_format = OutputFormat::kText;
+  std::string page;  ///< path of the page; "": no page
 };
 
 /// Returns a validator for CLI11 that accepts the names of `values`, and replaces a name by the
@@ -174,6 +177,10 @@ ExitCode RunEval(const EvalArguments& arguments) {
   }
   MakeUnique(evaluations);
   Print(Text(evaluations, arguments.output_format));
+  if (!arguments.page.empty()) {
+    WritePageFile(arguments.page, EvaluationPage(evaluations));
+    if (arguments.output_format == OutputFormat::kText) Print(ReportLine(arguments.page));
+  }
   return code;
 }
 
@@ -295,6 +302,9 @@ void AddOutputFormats(CLI::App& command, EvalArguments& a) {
   CLI::Option* latex = add("--latex", OutputFormat::kLatex, "print a LaTeX table");
   json->excludes(markdown)->excludes(latex);
   markdown->excludes(latex);
+  command.add_option("-o,--output", a.page, "also write an interactive page with map and errors")
+      ->option_text("FILE")
+      ->check(IsNonEmpty);
   command.add_flag("--quiet")->description("do not print warnings");
 }
 

@@ -30,15 +30,14 @@ constexpr const char* kRunFooter = R"(Examples:
   tail -f log.csv | alidade run live.yaml --set source.path=/dev/stdin --follow | my_robot
 
 The folder is called DIR.partial until the run ends. Ctrl-C finishes the frame, writes the results
-so far and exits with code 75; a second Ctrl-C exits at once. While figures are drawn, Ctrl-C skips
-the remaining figures.)";
+so far and exits with code 75; a second Ctrl-C exits at once.)";
 
 struct RunArguments {
   std::string command;  ///< complete command line
   Input input;
   std::string folder;
   std::optional<std::uint64_t> seed;
-  bool force = false, quiet = false, no_figures = false, covariances = false, all = false;
+  bool force = false, quiet = false, covariances = false, all = false;
   bool follow = false, view = false, strict = false;
   std::string video;
 };
@@ -94,12 +93,8 @@ std::string Summary(const RunResult& result, const std::string& table, const Rec
                     const std::string& video) {
   std::string text = VerdictText(result) + '\n' + table;
   if (const std::string events = EventSummary(result); !events.empty()) text += '\n' + events;
-  text += "\nwrote " + recorder.folder().string() + '\n';
-  for (const std::string& path : recorder.highlights()) {
-    text += "  " + (recorder.folder() / path).string() + '\n';
-  }
-  if (!video.empty()) text += "wrote " + video + '\n';
-  return text;
+  if (!video.empty()) text += "\nwrote " + video + '\n';
+  return text + ReportLine(recorder.folder());
 }
 
 /// Returns the viewer for the video and the window, or null if neither is requested.
@@ -119,15 +114,13 @@ std::unique_ptr<RunViewer> ViewerOf(const RunArguments& arguments, const Experim
 /// Returns the options that affect the bytes of the run folder.
 std::vector<std::string> ArgumentsOf(const RunArguments& arguments) {
   std::vector<std::string> list = {"run"};
-  if (arguments.no_figures) list.emplace_back("--no-figures");
   if (arguments.covariances) list.emplace_back("--covariances");
   return list;
 }
 
 Recorder::Options RecordOf(const RunArguments& arguments, const Config& config,
                            const std::filesystem::path& folder, const PluginHost& host) {
-  Recorder::Options record{folder, arguments.force, !arguments.no_figures, arguments.command,
-                           StopRequested};
+  Recorder::Options record{folder, arguments.force, arguments.command};
   record.covariances = arguments.covariances;
   record.plugins = internal::HashFiles(internal::FindUsedPlugins({config}, host));
   record.inputs =
@@ -203,7 +196,6 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
       ->check(IsAvi);
   command.add_flag("--view", arguments->view,
                    "show the annotated images in a window during the run");
-  command.add_flag("--no-figures", arguments->no_figures, "do not draw figures");
   command.add_flag("--covariances", arguments->covariances,
                    "write the covariance of every estimate, for `alidade compare`");
   command.footer(kRunFooter);

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sweep_report.h"
 
-#include <algorithm>
-#include <cctype>
-
+#include "alidade/base/text.h"
 #include "alidade/io/output_folder.h"
 #include "alidade/replay/run_inputs.h"
 #include "alidade/sweep/worst_seeds.h"
@@ -30,39 +28,21 @@ bool ReportFailures(const SweepResult& result, const std::string& prefix) {
   return failed > 0;
 }
 
-/// Returns the text as one word of a shell command.
-std::string ShellWord(const std::string& text) {
-  const auto is_plain = [](unsigned char c) {
-    return std::isalnum(c) != 0 || c == '/' || c == '.' || c == '_' || c == '-';
-  };
-  if (std::ranges::all_of(text, is_plain)) return text;
-  std::string word = "'";
-  for (const char c : text) c == '\'' ? word += "'\\''" : word += c;
-  return word + '\'';
-}
-
 /// Returns the lines of the worst seeds, and the command that repeats the run of the worst. Returns
 /// "" if no seeds are listed. `inputs` is the text of inputs.json.
 std::string WorstSeedText(const SweepResult& result, const std::filesystem::path& folder,
                           const std::string& inputs) {
   const std::vector<internal::WorstSeeds> worst = internal::FindWorstSeeds(result);
   if (worst.empty()) return "";
-  std::string command = "alidade run " + ShellWord((folder / internal::kResolvedConfig).string()) +
+  std::string command = "alidade run " +
+                        internal::ShellWord((folder / internal::kResolvedConfig).string()) +
                         " --seed " + std::to_string(worst.front().seeds.front());
   const internal::RecordedInputs recorded =
       internal::ReadInputs(inputs, (folder / internal::kInputsFile).string());
   for (const std::filesystem::path& path : recorded.command.plugin_paths) {
-    command += " --plugin-path " + ShellWord(path.string());
+    command += " --plugin-path " + internal::ShellWord(path.string());
   }
   return internal::WorstSeedLines(worst) + "repeat the run of a seed: " + command + '\n';
-}
-
-/// Prints the table of a sweep and the names of its main files.
-void PrintWritten(const std::filesystem::path& path, const std::string& table,
-                  const std::vector<std::string>& names) {
-  std::string text = table + "\nwrote " + path.string() + '\n';
-  for (const std::string& name : names) text += "  " + (path / name).string() + '\n';
-  Print(text);
 }
 
 ExitCode CodeOf(bool stopped, bool failed) {
@@ -81,8 +61,8 @@ ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
   folder.Write(result, summaries, config);
   if (!quiet) {
     const std::filesystem::path written = result.stopped ? internal::PartialOf(path) : path;
-    PrintWritten(written, SweepTable(result, summaries) + WorstSeedText(result, written, inputs),
-                 {"table.md", "sweep.json", "runs.csv"});
+    Print(SweepTable(result, summaries) + WorstSeedText(result, written, inputs) +
+          ReportLine(written));
   }
   return CodeOf(result.stopped, failed);
 }
@@ -99,16 +79,11 @@ ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
   }
   const auto values = static_cast<std::int64_t>(variation.values.size());
   if (sweep.stopped()) ReportStopped(done, values * sweep.results.front().runs, kResume);
-  const std::string note = folder.Write(sweep, config, StopRequested);
+  folder.Write(sweep, config);
   if (!quiet) {
     const std::filesystem::path written = sweep.stopped() ? internal::PartialOf(path) : path;
-    std::vector<std::string> names = {"table.md", "sweep.csv", "sweep.json", "runs.csv"};
-    if (note.empty()) names.insert(names.begin(), "figures/vary.svg");
-    const std::string reprojection = "figures/reprojection.svg";
-    if (std::filesystem::exists(written / reprojection)) names.insert(names.begin(), reprojection);
-    PrintWritten(written, SweepTable(sweep), names);
+    Print(SweepTable(sweep) + ReportLine(written));
   }
-  if (!note.empty()) Log(LogLevel::kWarning, "no figure was drawn: " + note);
   return CodeOf(sweep.stopped(), failed);
 }
 

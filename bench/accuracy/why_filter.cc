@@ -6,8 +6,7 @@
 //
 //   accuracy_why_filter examples/10_slam_scene/sweep_batch.yaml FOLDER [SEEDS]
 //
-// This command runs the seeds 1001, 1002, ... It writes FOLDER/figures/why_filter.svg and
-// FOLDER/why_filter.csv, with the columns
+// This command runs the seeds 1001, 1002, ... It writes FOLDER/why_filter.csv with the columns
 //
 //   rmse_m    sqrt(mean |e|^2) of the position at the last frame, m
 //   bits      mean of E = 1/2 log2(det C_0 / det C), with the 6 x 6 covariance C of the last pose,
@@ -24,8 +23,6 @@
 #include <vector>
 
 #include "alidade/experiment/run.h"
-#include "alidade/record/figure_script.h"
-#include "alidade/record/gnuplot.h"
 #include "bench/speed/interleaved.h"
 
 namespace {
@@ -196,45 +193,6 @@ void Write(const std::vector<Row>& rows, const std::filesystem::path& file) {
   }
 }
 
-/// Draws a curve for each number of points, with a mark for each number of frames.
-void Draw(const std::vector<Row>& rows, const std::filesystem::path& folder) {
-  using alidade::internal::FigureScript;
-  FigureScript script("why_filter", "accuracy against cost: filter and batch",
-                      "CPU time of the trajectory, relative to the smallest filter");
-  script.PanelHeight(220);
-  script.Set("set logscale x\nset format x '%g'");
-  const alidade::internal::FigureFile file{"why_filter.csv",
-                                           static_cast<std::int64_t>(rows.size())};
-  const auto panel = [&](const char* title, const char* unit, const char* scale,
-                         const std::string& value) {
-    script.Panel(title, unit);
-    script.Set(scale);
-    int style = 0;
-    for (const std::string& estimator : kEstimators) {
-      for (const int points : kPoints) {
-        const int color = style++ % static_cast<int>(kPoints.size()) + 1;
-        const bool dashed = estimator != kEstimators[0];
-        script.Curve(file,
-                     "(strcol('estimator') eq '" + estimator +
-                         "' && column('points') == " + std::to_string(points) +
-                         " ? column('cpu') : NaN):(" + value + ") with linespoints ls " +
-                         std::to_string(color) + (dashed ? " dt 2 pt 6 ps 0.6" : " pt 7 ps 0.6"),
-                     estimator + ", " + std::to_string(points) + " points");
-      }
-    }
-  };
-  panel("RMSE of the final position; marks: 10, 19, 38, 75 and 150 frames", "[mm]",
-        "set logscale y", "1e3 * column('rmse_m')");
-  panel("reduction of the entropy of the last pose, relative to the smallest filter", "[bits]",
-        "unset logscale y", "column('bits')");
-  std::filesystem::create_directories(folder / "figures");
-  std::ofstream(folder / "figures" / "why_filter.gp") << script.Text();
-  const auto gnuplot = alidade::internal::RunGnuplot(folder, {"figures/why_filter.gp"}, {});
-  if (gnuplot.end == alidade::internal::GnuplotResult::End::kFailed) {
-    std::fprintf(stderr, "%s\n", gnuplot.complaint.c_str());
-  }
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -247,7 +205,6 @@ int main(int argc, char** argv) {
     std::filesystem::create_directories(folder);
     const std::vector<Row> rows = Measure(argv[1], argc == 4 ? std::max(1, std::atoi(argv[3])) : 5);
     Write(rows, folder / "why_filter.csv");
-    Draw(rows, folder);
   } catch (const alidade::Error& error) {
     std::fprintf(stderr, "error: %s\n", error.what());
     return static_cast<int>(error.code());

@@ -18,7 +18,7 @@ const std::string kRemedy =
 class CalibrationCli : public testing::ProgramTest {
  protected:
   Outcome Run(const std::string& config, const std::string& setting = "") const {
-    std::vector<std::string> arguments = {"run", config, "-o", "out", "--no-figures", "--force"};
+    std::vector<std::string> arguments = {"run", config, "-o", "out", "--force"};
     if (!setting.empty()) arguments.insert(arguments.end(), {"--set", setting});
     return Call(arguments);
   }

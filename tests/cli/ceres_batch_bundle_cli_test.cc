@@ -29,7 +29,7 @@ TEST_F(BundleCli, AdjustsAndWritesTheSameFormat) {
   EXPECT_TRUE(
       Contains(made.out, "gauge: the pose of the first camera and the scale are constant\n"))
       << made.out;
-  EXPECT_TRUE(Contains(made.out, "wrote out\n  out/bundle.json\n")) << made.out;
+  EXPECT_TRUE(Contains(made.out, "\nreport   out/report.html\n")) << made.out;
   const Outcome again = Call({"bundle", "out/problem.txt"});
   EXPECT_EQ(again.code, 0) << again.err;
   EXPECT_LT(Json("out/bundle.json").root().At("rms_after_px").Number(), 1e-8);

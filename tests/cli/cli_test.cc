@@ -87,22 +87,22 @@ TEST_F(Cli, UsageErrorsExitWithTwoAndNameHelp) {
 }
 
 TEST_F(Cli, UnderscoresInTheNameOfAnOptionMeanHyphens) {
-  EXPECT_EQ(Call({"run", "config.yaml", "-o", "a", "--no_figures", "--allow_outside",
+  EXPECT_EQ(Call({"run", "config.yaml", "-o", "a", "--allow_outside",
                   "--plugin_path=" ALIDADE_BINARY_DIR "/lib/alidade/plugins"})
                 .code,
             0);
   // Underscores become hyphens in option names only, not in option values. The record contains the
   // command line as the user entered it.
-  EXPECT_EQ(Call({"run", "config.yaml", "--output=b_c", "--no_figures",
+  EXPECT_EQ(Call({"run", "config.yaml", "--output=b_c", "--allow_outside",
                   "--set=source.sigma_disparity_px=0"})
                 .code,
             0);
   EXPECT_TRUE(Exists("b_c/run.json"));
   EXPECT_TRUE(Contains(Read("b_c/config.resolved.yaml"), "sigma_disparity_px: 0"));
-  EXPECT_TRUE(Contains(Read("b_c/timing.json"), "--no_figures"));
+  EXPECT_TRUE(Contains(Read("b_c/timing.json"), "--allow_outside"));
   // Arguments after `--` are not options.
   Write("--my_config.yaml", testing::kDepthConfig);
-  EXPECT_EQ(Call({"run", "-o", "d", "--no-figures", "--", "--my_config.yaml"}).code, 0);
+  EXPECT_EQ(Call({"run", "-o", "d", "--", "--my_config.yaml"}).code, 0);
 }
 
 TEST_F(Cli, VersionIsOneLine) {
@@ -112,19 +112,19 @@ TEST_F(Cli, VersionIsOneLine) {
 }
 
 TEST_F(Cli, RunPrintsTheComparisonAndWhereItWrote) {
-  const Outcome run = Call({"run", "config.yaml", "--no-figures"});
+  const Outcome run = Call({"run", "config.yaml"});
   EXPECT_EQ(run.code, 0) << run.err;
   EXPECT_TRUE(Contains(run.out, "rmse target.depth [mm]")) << run.out;
-  EXPECT_TRUE(Contains(run.out, "wrote runs/config\n")) << run.out;
+  EXPECT_TRUE(Contains(run.out, "\nreport   runs/config/report.html\n")) << run.out;
   // If standard error is not a terminal, the program prints neither progress nor colour.
   EXPECT_EQ(run.err, "");
   EXPECT_EQ(Json("runs/config/run.json").root().At("status").Text(), "ok");
-  EXPECT_EQ(Call({"run", "config.yaml", "--force", "--quiet", "--no-figures"}).out, "");
+  EXPECT_EQ(Call({"run", "config.yaml", "--force", "--quiet"}).out, "");
 }
 
 TEST_F(Cli, SetAndSeedReplaceKeysOfTheConfig) {
   const auto rmse = [&](const Arguments& more) {
-    Arguments all = {"run", "config.yaml", "-o", "out", "--force", "--no-figures"};
+    Arguments all = {"run", "config.yaml", "-o", "out", "--force"};
     all.insert(all.end(), more.begin(), more.end());
     EXPECT_EQ(Call(all).code, 0);
     const Config record = Json("out/run.json");
@@ -195,7 +195,7 @@ TEST_F(Cli, UntrustedPluginIsRefusedWithSeventySeven) {
 
 TEST_F(Cli, BadDataEndsTheRunAndLeavesARecord) {
   Write("table.csv", "t_s,d\n0,80\n0.1,81\n0.2,eighty\n");
-  const Outcome run = Call({"run", "table.yaml", "--no-figures"});
+  const Outcome run = Call({"run", "table.yaml"});
   EXPECT_EQ(run.code, 65);
   EXPECT_TRUE(Contains(run.err, "table.csv:4:5 d: 'eighty'")) << run.err;
   const Config record = Json("runs/table/run.json");
@@ -205,11 +205,11 @@ TEST_F(Cli, BadDataEndsTheRunAndLeavesARecord) {
 }
 
 TEST_F(Cli, DivergenceEndsTheRunWhereAsked) {
-  const Outcome reported = Call(Diverging({"run", "config.yaml", "--no-figures"}));
+  const Outcome reported = Call(Diverging({"run", "config.yaml"}));
   EXPECT_EQ(reported.code, 0);
   EXPECT_TRUE(Contains(reported.out, "ekf: diverged")) << reported.out;
-  const Outcome failed = Call(Diverging({"run", "config.yaml", "--no-figures", "--force", "--set",
-                                         "estimators.ekf.on_divergence=fail"}));
+  const Outcome failed = Call(
+      Diverging({"run", "config.yaml", "--force", "--set", "estimators.ekf.on_divergence=fail"}));
   EXPECT_EQ(failed.code, 79);
   EXPECT_TRUE(Contains(failed.err, "error: estimator 'ekf' at t = ")) << failed.err;
   EXPECT_EQ(Json("runs/config/run.json").root().At("status").Text(), "failed");
@@ -217,7 +217,7 @@ TEST_F(Cli, DivergenceEndsTheRunWhereAsked) {
 
 // Tests fault 89 of tests/faults/README.md.
 TEST_F(Cli, OutputThatCannotBeWrittenIsSeventyFour) {
-  const Outcome full = Call({"run", "config.yaml", "--no-figures"}, "/dev/full");
+  const Outcome full = Call({"run", "config.yaml"}, "/dev/full");
   EXPECT_EQ(full.code, 74);
   EXPECT_TRUE(Contains(full.err, "error: <stdout>: cannot write")) << full.err;
   EXPECT_EQ(Json("runs/config/run.json").root().At("status").Text(), "ok");
@@ -233,7 +233,7 @@ class PipedRun : public testing::ProgramTest {
     ASSERT_EQ(::mkfifo((folder_ / "table.csv").c_str(), 0600), 0);
     pipe_ = ::open((folder_ / "table.csv").c_str(), O_RDWR | O_CLOEXEC);
     Feed("t_s,d\n0,80\n0.1,81\n0.2,82\n");
-    run_ = Start({"run", "table.yaml", "--no-figures", "--follow", "-o", "out"});
+    run_ = Start({"run", "table.yaml", "--follow", "-o", "out"});
     ASSERT_TRUE(Eventually([&] { return Contains(Read("stdout"), "\"t_s\":0.2,"); }));
   }
   void TearDown() override {
@@ -276,7 +276,7 @@ TEST_F(PipedRun, EndsAtOnceAtTheSecondSignal) {
 
 TEST_F(Cli, StopsAtASignalWhileNobodyWritesToThePipe) {
   ASSERT_EQ(::mkfifo((folder_ / "table.csv").c_str(), 0600), 0);
-  const pid_t run = Start({"run", "table.yaml", "--no-figures", "-o", "out"});
+  const pid_t run = Start({"run", "table.yaml", "-o", "out"});
   // The run has a handler for SIGINT (bit 1 of the mask) and waits in the call that opens the pipe.
   const auto waits = [&] {
     const std::string status = testing::ReadText("/proc/" + std::to_string(run) + "/status");
@@ -298,34 +298,16 @@ TEST_F(Cli, StopsAtASignalWhileNobodyWritesToThePipe) {
   EXPECT_FALSE(Exists("out"));
 }
 
-TEST_F(Cli, ASignalWhileFiguresAreDrawnKeepsTheRun) {
-  fs::create_directory(folder_ / "bin");
-  Write("bin/gnuplot", "#!/bin/sh\n: > sleeping\nexec sleep 100\n");
-  fs::permissions(folder_ / "bin/gnuplot", fs::perms::owner_all);
-  const std::string path = std::getenv("PATH");
-  ::setenv("PATH", (folder_.string() + "/bin:" + path).c_str(), 1);
-  const pid_t run = Start({"run", "config.yaml", "-o", "out"});
-  ::setenv("PATH", path.c_str(), 1);
-  ASSERT_TRUE(Eventually([&] { return Exists("out.partial/sleeping"); }));
-  ::kill(run, SIGINT);
-  const Outcome ended = Wait(run);
-  EXPECT_EQ(ended.code, 0) << ended.err;
-  EXPECT_TRUE(Contains(ended.err, " figures drawn: the drawing was stopped\n")) << ended.err;
-  EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "ok");
-  EXPECT_TRUE(Exists("out/report.html"));
-}
-
 TEST_F(Cli, TimingHasTheWholeCommand) {
-  const Arguments arguments = {"run", "config.yaml", "--no-figures", "--set=title=it's a \"run\""};
+  const Arguments arguments = {"run", "config.yaml", "--set=title=it's a \"run\""};
   EXPECT_EQ(Call(arguments).code, 0);
   EXPECT_EQ(Json("runs/config/timing.json").root().At("command").Text(),
-            "alidade run config.yaml --no-figures '--set=title=it'\\''s a \"run\"'");
+            "alidade run config.yaml '--set=title=it'\\''s a \"run\"'");
 }
 
 TEST_F(Cli, StopsBetweenFramesAtASignal) {
   // A run over 300000 frames takes seconds.
-  const pid_t run = Start(
-      {"run", "config.yaml", "--no-figures", "-o", "out", "--set", "source.duration_s=10000"});
+  const pid_t run = Start({"run", "config.yaml", "-o", "out", "--set", "source.duration_s=10000"});
   ASSERT_TRUE(Eventually([&] { return Exists("out.partial/ekf/estimates.csv"); }));
   ::kill(run, SIGTERM);
   const Outcome stopped = Wait(run);
@@ -338,8 +320,7 @@ TEST_F(Cli, StopsBetweenFramesAtASignal) {
 // counted, SIGTERM would be the second signal and would end the run at once.
 TEST_F(Cli, AHangUpThatIsIgnoredStopsNothing) {
   before_ = "trap '' HUP";
-  const pid_t run = Start(
-      {"run", "config.yaml", "--no-figures", "-o", "out", "--set", "source.duration_s=10000"});
+  const pid_t run = Start({"run", "config.yaml", "-o", "out", "--set", "source.duration_s=10000"});
   ASSERT_TRUE(Eventually([&] { return Exists("out.partial/ekf/estimates.csv"); }));
   ::kill(run, SIGHUP);
   ::kill(run, SIGTERM);

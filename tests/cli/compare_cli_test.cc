@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 class CompareFolderCli : public testing::ProgramTest {};
 
 TEST_F(CompareFolderCli, SaysHowManyRowsAreNotFinite) {
-  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out"}).code, 0);
   EXPECT_FALSE(Contains(Call({"compare", "out"}).out, "not finite"));
   std::istringstream rows(Read("out/ekf/estimates.csv"));
   std::string text;
@@ -61,8 +61,7 @@ class CompareCli : public testing::ProgramTest {
     Write(name, text);
   }
   Outcome Table(const std::string& table, const std::string& folder) const {
-    return Call({"run", "table.yaml", "--set", "source.path=" + table, "-o", folder, "--no-figures",
-                 "--quiet"});
+    return Call({"run", "table.yaml", "--set", "source.path=" + table, "-o", folder, "--quiet"});
   }
 };
 
@@ -128,9 +127,7 @@ TEST_F(CompareCli, TheFolderOfARunTellsTheSame) {
 
 TEST_F(CompareCli, OfSeveralFoldersEstimatorsAreNamedByTheirs) {
   ASSERT_EQ(Call({"compare", "config.yaml", "-o", "runs/a", "--quiet"}).code, 0);
-  ASSERT_EQ(Call({"run", "config.yaml", "-o", "runs/b", "--no-figures", "--set",
-                  "estimators.ekf.gate=0.5"})
-                .code,
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "runs/b", "--set", "estimators.ekf.gate=0.5"}).code,
             0);
   const Outcome compared = Call({"compare", "runs/a", "runs/b", "-o", "both"});
   EXPECT_EQ(compared.code, 0) << compared.err;
@@ -190,11 +187,8 @@ TEST_F(CompareCli, TellsWhereARunEndsEarlier) {
 
 TEST_F(CompareCli, WarnsOfSettingsAndTruthsThatDiffer) {
   WriteTable("table.csv");
-  ASSERT_EQ(Call({"run", "config.yaml", "-o", "a", "--no-figures"}).code, 0);
-  ASSERT_EQ(
-      Call({"run", "config.yaml", "-o", "b", "--no-figures", "--set", "sensors.stereo.sigma_px=2"})
-          .code,
-      0);
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "a"}).code, 0);
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "b", "--set", "sensors.stereo.sigma_px=2"}).code, 0);
   const Outcome compared = Call({"compare", "a", "b", "--reference", "a/ekf"});
   EXPECT_TRUE(Contains(compared.out, "'a/ekf' has no covariance.bin")) << compared.out;
   EXPECT_TRUE(Contains(compared.out,
@@ -204,7 +198,7 @@ TEST_F(CompareCli, WarnsOfSettingsAndTruthsThatDiffer) {
 }
 
 TEST_F(CompareCli, CovariancesOfARunAreWrittenWhereAskedFor) {
-  ASSERT_EQ(Call({"run", "config.yaml", "-o", "a", "--no-figures", "--covariances"}).code, 0);
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "a", "--covariances"}).code, 0);
   // The file has 152 frames, each with the lower triangle of a 3 x 3 matrix.
   EXPECT_EQ(Read("a/ekf/covariance.bin").size(), 152u * 6u * 8u);
   const Outcome compared = Call({"compare", "a", "--reference", "ekf"});
@@ -251,8 +245,8 @@ TEST_F(CompareCli, WithholdsTheComparisonWhereTheBatchFailed) {
 // of them is sufficient.
 TEST_F(CompareCli, TheBatchOfAnotherFolderServesWhereOneFailed) {
   const auto run = [this](const std::string& folder, const std::string& batch) {
-    return Call({"run", "config.yaml", "-o", folder, "--no-figures", "--quiet", "--covariances",
-                 "--set", "estimators.batch=" + batch})
+    return Call({"run", "config.yaml", "-o", folder, "--quiet", "--covariances", "--set",
+                 "estimators.batch=" + batch})
         .code;
   };
   ASSERT_NE(run("fa", "{type: ceres_batch, max_iterations: 1}"), 0);
@@ -408,19 +402,17 @@ TEST_F(CompareCli, ErrorsOverTimeAreThoseOfTheRuns) {
   for (std::size_t k = 0; k < low.size(); ++k) EXPECT_LE(low[k], high[k]);
 }
 
-TEST_F(CompareCli, OverSeedsThereIsAReportWithFigures) {
+TEST_F(CompareCli, OverSeedsThereIsAPageAndTheCost) {
   const Outcome compared = Call({"compare", "config.yaml", "--runs", "2", "--set",
                                  "source.duration_s=2", "--jobs", "1", "-o", "out"});
   ASSERT_EQ(compared.code, 0) << compared.err;
-  EXPECT_FALSE(Contains(compared.err, "figures:")) << compared.err;
-  const std::string html = Read("out/report.html"), files = Read("out/files.txt");
-  EXPECT_TRUE(Contains(html, "paired bootstrap"));
-  EXPECT_TRUE(Contains(html, "ANEES in its bounds target [%]"));
-  for (const char* name : {"anees", "rms.target.depth", "rms.template.inverse_distance", "cost",
-                           "cost.online", "cost.smoothed"}) {
-    EXPECT_TRUE(Contains(html, std::string("gnuplot figures/") + name + ".gp")) << name;
-    EXPECT_TRUE(Contains(files, std::string("figures/") + name + ".svg")) << files;
+  EXPECT_TRUE(compared.out.ends_with("\nreport   out/report.html\n")) << compared.out;
+  EXPECT_TRUE(Contains(Read("out/files.txt"), "\nreport.html\n"));
+  const std::string page = Read("out/report.html");
+  for (const char* column : {"ekf.rms:target.depth", "ekf.anees:target"}) {
+    EXPECT_TRUE(Contains(page, std::string(1, '"') + column + "\":")) << column;
   }
+  EXPECT_TRUE(Contains(page, "alidade compare config.yaml --runs 2 --first-seed 1"));
   // cpu_us is the CPU time of a batch alone. cpu_us.all includes the filter from which the batch
   // starts.
   const std::string csv = Read("out/cost.csv");
@@ -484,7 +476,7 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
     EXPECT_EQ(outcome.code, code) << words << outcome.err;
     EXPECT_TRUE(Contains(outcome.err, words)) << outcome.err;
   };
-  ASSERT_EQ(Call({"run", "config.yaml", "-o", "a", "--no-figures"}).code, 0);
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "a"}).code, 0);
   fails({"compare"}, 2, "the argument CONFIG | DIR is missing");
   fails({"compare", "a", "config.yaml"}, 2, "'config.yaml' is not a folder");
   fails({"compare", "a", "--runs", "3"}, 2, "finished runs do not support this option");
@@ -520,7 +512,6 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
         "a: the folder is the input 'a'; expected another folder");
   fails({"compare", "a", "-o", ".", "--force"}, 73, ".: the folder contains the input 'a'");
   EXPECT_TRUE(Exists("a/ekf/estimates.csv"));
-  fails({"compare", "config.yaml", "--runs", "2", "--figures"}, 2, "--figures");
   const std::string whole = Read("a/ekf/estimates.csv");
   const std::size_t last = whole.rfind('\n', whole.size() - 2) + 1;
   Write("a/ekf/estimates.csv", whole.substr(0, last));

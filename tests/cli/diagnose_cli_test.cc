@@ -12,7 +12,7 @@ class DiagnoseCli : public testing::ProgramTest {
  protected:
   /// Runs config.yaml with settings, and returns the outcome of `diagnose`.
   Outcome Diagnose(const Arguments& settings, const Arguments& options = {}) const {
-    Arguments run = {"run", "config.yaml", "-o", "out", "--force", "--no-figures", "--quiet"};
+    Arguments run = {"run", "config.yaml", "-o", "out", "--force", "--quiet"};
     for (const std::string& setting : settings) run.insert(run.end(), {"--set", setting});
     EXPECT_EQ(Call(run).code, 0) << Read("stderr");
     Arguments diagnose = {"diagnose", "out"};
@@ -160,8 +160,7 @@ TEST_F(DiagnoseCli, OneEstimatorCanBeSelected) {
 
 TEST_F(DiagnoseCli, WhyNeedsTheInputsAndTheDataOfTheRun) {
   Write("table.csv", "t_s,d\n0,86\n0.1,87\n0.2,86.5\n");
-  ASSERT_EQ(Call({"run", "table.yaml", "-o", "out", "--no-figures", "--quiet"}).code, 0)
-      << Read("stderr");
+  ASSERT_EQ(Call({"run", "table.yaml", "-o", "out", "--quiet"}).code, 0) << Read("stderr");
   EXPECT_EQ(Call({"diagnose", "out", "--why"}).code, 0) << Read("stderr");
   Write("table.csv", "t_s,d\n0,86\n0.1,87\n0.2,84\n");
   const Outcome changed = Call({"diagnose", "out", "--why"});

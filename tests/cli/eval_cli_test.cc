@@ -356,7 +356,7 @@ TEST_F(EvalCli, AChoiceIsNamedAmongThoseThereAre) {
 
 TEST_F(EvalCli, OfARunSaysWhatTheRunSaid) {
   const std::string example = ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml";
-  ASSERT_EQ(Call({"run", example, "-o", "slam", "--no-figures", "--quiet"}).code, 0);
+  ASSERT_EQ(Call({"run", example, "-o", "slam", "--quiet"}).code, 0);
   const Config run = Json("slam/run.json");
   const Node metrics = run.root().At("estimators").At("ekf").At("metrics");
   const Config json = Evaluated({"slam", "slam", "-r", "trans_part", "-r", "angle_rad"});
@@ -422,8 +422,8 @@ TEST_F(EvalCli, ARobotInThePlaneHasATrajectory) {
   Write("planar.yaml", kPlanarConfig);
   Write("drive.csv", PlanarDrive());
   const std::string plugin = ALIDADE_BINARY_DIR "/tests/plugins/planar.so";
-  const Outcome run = Call(
-      {"run", "planar.yaml", "-o", "planar", "--plugin-path", plugin, "--no-figures", "--quiet"});
+  const Outcome run =
+      Call({"run", "planar.yaml", "-o", "planar", "--plugin-path", plugin, "--quiet"});
   ASSERT_EQ(run.code, 0) << run.err;
   const Config json = Evaluated({"planar", "-r", "trans_part", "-r", "angle_rad"});
   const Node one = json.root().At("evaluations").Items().front();

@@ -19,7 +19,7 @@ class LogCli : public testing::ProgramTest {
   void TearDown() override { ::unsetenv("ALIDADE_LOG"); }
 
   static Arguments Run(Arguments more) {
-    more.insert(more.begin(), {"run", "config.yaml", "-o", "out", "--force", "--no-figures"});
+    more.insert(more.begin(), {"run", "config.yaml", "-o", "out", "--force"});
     return more;
   }
 };
@@ -90,7 +90,7 @@ TEST_F(LogCli, EveryCommandTakesALevel) {
 // therefore identical for every output folder and every log level of the terminal.
 TEST_F(LogCli, TheLogOfARunHasTheSameBytes) {
   const auto into = [&](const std::string& folder, const Arguments& more) {
-    Arguments all = Diverging({"run", "config.yaml", "--no-figures", "-o", folder});
+    Arguments all = Diverging({"run", "config.yaml", "-o", folder});
     all.insert(all.end(), more.begin(), more.end());
     Call(all);
     return Read(folder + "/log.txt");

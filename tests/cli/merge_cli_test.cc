@@ -47,7 +47,7 @@ TEST_F(MergeCli, ShardsGiveTheBytesOfOneProcess) {
   SweepAll();
   const Outcome merged = Merge({"s3", "s1", "s2"});
   EXPECT_EQ(merged.code, 0) << merged.err;
-  EXPECT_TRUE(Contains(merged.out, "\nwrote merged\n")) << merged.out;
+  EXPECT_TRUE(Contains(merged.out, "\nreport   merged/report.html\n")) << merged.out;
   ExpectSameFiles(folder_ / "merged", folder_ / "whole");
   EXPECT_EQ(Call({"replay", "merged"}).code, 0) << Read("stdout") << Read("stderr");
   EXPECT_EQ(Call({"replay", "s2"}).code, 0) << Read("stdout") << Read("stderr");
@@ -147,7 +147,7 @@ TEST_F(MergeCli, RefusesWhatIsNoFinishedShard) {
   ASSERT_EQ(Sweep("s1", "1/2").code, 0);
   ASSERT_EQ(Sweep("whole", "").code, 0);
   ExpectRefused({"s1", "whole"}, "whole/inputs.json: this is not the inputs.json of a shard");
-  ASSERT_EQ(Call({"run", "config.yaml", "-o", "run", "--no-figures"}).code, 0);
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "run"}).code, 0);
   ExpectRefused({"run", "s1"}, "run/inputs.json: this is not the inputs.json of a shard");
   ASSERT_EQ(Sweep("s2", "2/2").code, 0);
   const std::string runs = Read("s2/finished_runs.jsonl"), summary = Read("s2/sweep.json");

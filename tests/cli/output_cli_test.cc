@@ -24,14 +24,15 @@ TEST_F(OutputCli, OutputIsCalledAsTheConfig) {
     const std::string output = name == "config.yaml" ? "05_depth" : "base";
     for (const std::string& config :
          {"05_depth/" + name, "./05_depth/../05_depth/" + name, (folder / name).string()}) {
-      const Outcome run = Call({"run", config, "--no-figures", "--force"});
+      const Outcome run = Call({"run", config, "--force"});
       EXPECT_EQ(run.code, 0) << run.err;
-      EXPECT_TRUE(Contains(run.out, "wrote runs/" + output + '\n')) << config << '\n' << run.out;
+      EXPECT_TRUE(Contains(run.out, "report   runs/" + output + "/report.html\n")) << config << '\n'
+                                                                                   << run.out;
     }
     fs::remove_all(folder_ / "runs");
     const fs::path before = folder_;
     folder_ = folder;
-    EXPECT_EQ(Call({"run", name, "--no-figures"}).code, 0);
+    EXPECT_EQ(Call({"run", name}).code, 0);
     EXPECT_TRUE(Exists("runs/" + output + "/run.json"));
     folder_ = before;
   }
@@ -39,8 +40,8 @@ TEST_F(OutputCli, OutputIsCalledAsTheConfig) {
 
 TEST_F(OutputCli, OutputIsNotTheFolderOfAllRuns) {
   const auto expect = [&](const Arguments& more, int code, const std::string& text) {
-    for (const Arguments& command : {Arguments{"run", "config.yaml", "--no-figures"},
-                                     {"sweep", "config.yaml", "--runs", "1"}}) {
+    for (const Arguments& command :
+         {Arguments{"run", "config.yaml"}, {"sweep", "config.yaml", "--runs", "1"}}) {
       Arguments all = command;
       all.insert(all.end(), more.begin(), more.end());
       const Outcome outcome = Call(all);
@@ -62,7 +63,7 @@ TEST_F(OutputCli, OutputIsNotTheFolderOfAllRuns) {
 
 TEST_F(OutputCli, OutputGoesWhereItIsNamed) {
   const auto run_into = [&](const char* output, const Arguments& more) {
-    Arguments all = {"run", "config.yaml", "--no-figures", "--set", output};
+    Arguments all = {"run", "config.yaml", "--set", output};
     all.insert(all.end(), more.begin(), more.end());
     return Call(all).code;
   };
@@ -100,7 +101,7 @@ TEST_F(OutputCli, NumbersOutOfRangeAreShownAsTyped) {
          "--jobs: '4294967297' is not an integer from 1 to 1024");
   expect({"sweep", "config.yaml", "--runs", "1", "--first-seed", "4611686018427387905"},
          "--first-seed: '4611686018427387905' is not an integer from 0 to 4611686018427387904");
-  EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "--seed", "9223372036854775807"}).code, 0);
+  EXPECT_EQ(Call({"run", "config.yaml", "--seed", "9223372036854775807"}).code, 0);
   EXPECT_TRUE(Contains(Read("runs/config/run.json"), "\"seed\": 9223372036854775807"));
 }
 
@@ -108,7 +109,7 @@ TEST_F(OutputCli, ErrorsObeyNoControlCharacters) {
   Write("table.csv",
         "t_s,\x1b[31md,\xc2\x9b"
         "1m,\xc3\xbc\n0,80,1,2\n");
-  const Outcome run = Call({"run", "table.yaml", "--no-figures"});
+  const Outcome run = Call({"run", "table.yaml"});
   EXPECT_EQ(run.code, 78);
   EXPECT_TRUE(Contains(run.err, "expected one of t_s, ?[31md, ?1m, \xc3\xbc")) << run.err;
   const Outcome missing = Call({"run", "\x1b[31m.yaml"});
@@ -141,37 +142,34 @@ TEST_F(OutputCli, MeasurementsStandBesideWhatTruthMakesOfThem) {
   EXPECT_NEAR(Cell(implied, t + "scale,", 2), s / lambda, 1e-12);
   const double d = Cell(Read("out/measurements.csv"), t + "disparity,", 3);
   EXPECT_NEAR(Cell(implied, t + "stereo,", 2), 26.0 / d, 1e-12);
-  const std::string figure = Read("out/figures/measurements.gp");
-  EXPECT_TRUE(Contains(figure, "'measured: scale, rest true'")) << figure;
-  EXPECT_TRUE(Contains(figure, "'expected.csv'")) << figure;
 }
 
 // Without -o a second run is not refused, and it does not replace the first run.
 TEST_F(OutputCli, ASecondRunGoesToANumberedFolder) {
-  const Arguments run = {"run", "config.yaml", "--no-figures"};
+  const Arguments run = {"run", "config.yaml"};
   const Outcome first = Call(run), second = Call(run);
   EXPECT_EQ(first.err, "");
   EXPECT_EQ(second.code, 0) << second.err;
   EXPECT_EQ(second.err,
             "runs/config exists: the output is runs/config-2 (--force replaces runs/config)\n");
-  EXPECT_TRUE(Contains(second.out, "\nwrote runs/config-2\n")) << second.out;
+  EXPECT_TRUE(Contains(second.out, "\nreport   runs/config-2/report.html\n")) << second.out;
   EXPECT_TRUE(Exists("runs/config-2/run.json"));
-  const Outcome third = Call({"run", "config.yaml", "--no-figures", "--quiet"});
+  const Outcome third = Call({"run", "config.yaml", "--quiet"});
   EXPECT_EQ(third.err, "");
   EXPECT_TRUE(Exists("runs/config-3/run.json"));
-  EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "--force"}).err, "");
+  EXPECT_EQ(Call({"run", "config.yaml", "--force"}).err, "");
   EXPECT_FALSE(Exists("runs/config-4"));
   for (const std::string name : {"own", "own-2"}) {
-    EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "--set", "output=own"}).code, 0);
+    EXPECT_EQ(Call({"run", "config.yaml", "--set", "output=own"}).code, 0);
     EXPECT_TRUE(Exists("runs/" + name + "/run.json"));
   }
-  EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "-o", "runs/own"}).code, 73);
+  EXPECT_EQ(Call({"run", "config.yaml", "-o", "runs/own"}).code, 73);
   // The folder of an incomplete run also reserves the name of the run.
   fs::create_directory(folder_ / "runs/left.partial");
-  EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "--set", "output=left"}).err,
+  EXPECT_EQ(Call({"run", "config.yaml", "--set", "output=left"}).err,
             "runs/left.partial exists: the output is runs/left-2 (--force replaces "
             "runs/left.partial)\n");
-  EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "-o", "runs/left"}).code, 73);
+  EXPECT_EQ(Call({"run", "config.yaml", "-o", "runs/left"}).code, 73);
 }
 
 TEST_F(OutputCli, ARefusedConfigNamesNoFolder) {
@@ -204,24 +202,19 @@ TEST_F(OutputCli, RunPrintsTenRowsAndAllOfThemIfAsked) {
     }
     return found;
   };
-  const Outcome ten = Call({"run", "config.yaml", "--no-figures"});
+  const Outcome ten = Call({"run", "config.yaml"});
   EXPECT_EQ(labels(ten.out),
             (std::vector<std::string>{
                 "verdict", "rmse target.depth [mm]", "rmse target.depth_rate [mm/s]",
                 "coverage95 target.depth [%]", "nees.mean target", "nees.mean template",
                 "nis.mean scale", "nis.mean stereo", "accepted scale", "accepted stereo"}))
       << ten.out;
-  const Outcome all = Call({"run", "config.yaml", "--no-figures", "--all"});
+  const Outcome all = Call({"run", "config.yaml", "--all"});
   const std::size_t rows = labels(all.out).size();
   EXPECT_GT(rows, 10u) << all.out;
   EXPECT_TRUE(Contains(ten.out, '\n' + std::to_string(rows - 10) + " more rows: --all\n"))
       << ten.out;
   EXPECT_FALSE(Contains(all.out, "more rows")) << all.out;
-  const std::string report = Read("runs/config/report.html");
-  const std::size_t details = report.find("<details><summary>all rows</summary>");
-  ASSERT_NE(details, report.npos);
-  EXPECT_LT(report.find("<td>nis.mean stereo</td>"), details);
-  EXPECT_GT(report.find("<td>lag target.depth [ms]</td>"), details);
 }
 
 TEST_F(OutputCli, SaysThatTheCurrentFolderIsGone) {
@@ -242,29 +235,8 @@ TEST_F(OutputCli, SaysThatTheCurrentFolderIsGone) {
   expect({"run", config, "-o", (folder_ / "out").string(), "--plugin-path", "plugins"});
   expect({"sweep", config, "--runs", "1"});
   fs::create_directory(folder_ / "gone");
-  const Outcome run = Call({"run", config, "--no-figures", "-o", (folder_ / "out").string()});
+  const Outcome run = Call({"run", config, "-o", (folder_ / "out").string()});
   EXPECT_EQ(run.code, 0) << run.err;
-}
-
-TEST_F(OutputCli, SaysHowManyFiguresAreMissingAndWhy) {
-  fs::create_directory(folder_ / "bin");
-  Write("bin/gnuplot", "#!/bin/sh\nexit 1\n");
-  fs::permissions(folder_ / "bin/gnuplot", fs::perms::owner_all);
-  before_ = "PATH=\"$PWD/bin:$PATH\"";
-  const Outcome run = Call({"run", "config.yaml"});
-  EXPECT_EQ(run.code, 0) << run.err;
-  const std::string note =
-      "0 of 7 figures drawn: measurements is not: gnuplot failed with exit code 1";
-  EXPECT_EQ(run.err, "warning: " + note + '\n');
-  EXPECT_TRUE(Read("runs/config/log.txt").ends_with("warning: " + note + '\n'));
-  EXPECT_FALSE(Contains(run.out, "figures drawn"));
-  EXPECT_TRUE(Contains(Read("runs/config/report.html"), note));
-  Write("bin/gnuplot", "#!/bin/sh\necho 'line 3: no such thing' >&2; exit 2\n");
-  EXPECT_EQ(Call({"run", "config.yaml", "--force"}).err,
-            "warning: 0 of 7 figures drawn: measurements is not: gnuplot failed with exit code 2: "
-            "line 3: no "
-            "such thing\n");
-  EXPECT_EQ(Call({"run", "config.yaml", "--force", "--quiet"}).err, "");
 }
 
 }  // namespace

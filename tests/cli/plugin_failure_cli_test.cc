@@ -31,8 +31,7 @@ source: {type: csv, path: rows.csv, streams: {z: u}}
 estimators: {ekf: {type: ekf}}
 )");
   const auto run = [&](const std::string& key, const std::string& value) {
-    return Call(
-        {"run", "probe.yaml", "-o", "out", "--no-figures", "--force", "--set", key + '=' + value});
+    return Call({"run", "probe.yaml", "-o", "out", "--force", "--set", key + '=' + value});
   };
   const std::string words =
       "Predict of model 'throws_in_eval' of plugin " + plugin + " threw: the dog ate it";
@@ -42,7 +41,7 @@ estimators: {ekf: {type: ekf}}
   EXPECT_EQ(ended.code, 69) << ended.err;
   EXPECT_TRUE(Contains(ended.err, words)) << ended.err;
   const Outcome shifted = Call(
-      {"run", "probe.yaml", "-o", "out", "--no-figures", "--force", "--set",
+      {"run", "probe.yaml", "-o", "out", "--force", "--set",
        "state.s={model: constant_velocity, noise: {kind: continuous, acceleration: 1}, "
        "initial: {position: {mean: 1, sigma: 1}, velocity: {mean: 0, sigma: 1}}}",
        "--set", "sensors.bad.roles={x: s.position}", "--set", "sensors.bad.time_offset_s=0.01"});
@@ -88,7 +87,7 @@ source: {type: csv, path: rows.csv, streams: {z: [u, v]}}
 estimators: {ekf: {type: ekf}}
 )");
   const auto policy = [&](const std::string& name) {
-    return Call({"run", "bad.yaml", "-o", "out", "--no-figures", "--force", "--set",
+    return Call({"run", "bad.yaml", "-o", "out", "--force", "--set",
                  "estimators.ekf.on_plugin_failure=" + name});
   };
   EXPECT_EQ(policy("skip").code, 0);

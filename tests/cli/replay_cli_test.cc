@@ -37,19 +37,17 @@ TEST_F(ReplayCli, MakesARunAgain) {
   const Outcome replay = Call({"replay", "out"});
   EXPECT_EQ(replay.code, 0) << replay.out << replay.err;
   const auto files = RunFiles(folder_ / "out").size();
-  const std::string drawn =
-      fs::exists(folder_ / "out/figures/timing.svg") ? "figures/timing.svg, " : "";
-  EXPECT_EQ(replay.out, "out: all " + std::to_string(files) + " files are equal; not compared: " +
-                            drawn + "timing.csv, timing.json\n");
+  EXPECT_EQ(replay.out, "out: all " + std::to_string(files) +
+                            " files are equal; not compared: timing.csv, timing.json\n");
   ExpectEqual({"-o", "again"});
   ExpectSameFiles(folder_ / "again", folder_ / "out");
 }
 
 TEST_F(ReplayCli, MakesExamplesAgain) {
   for (const Arguments& command : std::vector<Arguments>{
-           {"examples/07_depth_pairs/config.yaml", "--covariances", "--no-figures"},
-           {"examples/10_slam_scene/config.yaml", "--set", "source.max_frames=20", "--no-figures"},
-           {"examples/22_range_bearing/config.yaml", "--no-figures"}}) {
+           {"examples/07_depth_pairs/config.yaml", "--covariances"},
+           {"examples/10_slam_scene/config.yaml", "--set", "source.max_frames=20"},
+           {"examples/22_range_bearing/config.yaml"}}) {
     SCOPED_TRACE(command[0]);
     Arguments run = command;
     run[0] = ALIDADE_SOURCE_DIR "/" + command[0];
@@ -70,7 +68,7 @@ TEST_F(ReplayCli, MakesASweepAgain) {
 TEST_F(ReplayCli, MakesARunOfAConfigOfAnyNameAgain) {
   for (const char* name : {"again", "config", "made"}) {
     Write(name, Read("config.yaml"));
-    Make({"run", name, "--no-figures", "--force"});
+    Make({"run", name, "--force"});
     ExpectEqual();
   }
 }
@@ -83,7 +81,7 @@ TEST_F(ReplayCli, MakesARunWithThePluginsOfTheEnvironmentAgain) {
   fs::copy_file(ALIDADE_BINARY_DIR "/tests/faults/ratio.so", folder_ / "own/ratio.so");
   Write("own/broken.so", "no plugin");
   ::setenv("ALIDADE_PLUGIN_PATH", (folder_ / "own").c_str(), 1);
-  Make({"run", "config.yaml", "--no-figures", "--set",
+  Make({"run", "config.yaml", "--set",
         "sensors.ratio={model: ratio, stream: inverse_scale, roles: {numerator: target.depth, "
         "denominator: template.inverse_distance}}"});
   ::unsetenv("ALIDADE_PLUGIN_PATH");
@@ -94,13 +92,13 @@ TEST_F(ReplayCli, MakesARunWithThePluginsOfTheEnvironmentAgain) {
 // If a run fails because of its data, the replay fails in the same way.
 TEST_F(ReplayCli, MakesAFailureAgain) {
   WriteTable("none");
-  ASSERT_EQ(Call({"run", "table.yaml", "-o", "out", "--no-figures"}).code, 65);
+  ASSERT_EQ(Call({"run", "table.yaml", "-o", "out"}).code, 65);
   ExpectEqual();
 }
 
 TEST_F(ReplayCli, NamesDataThatChanged) {
   WriteTable("80");
-  Make({"run", "table.yaml", "--no-figures"});
+  Make({"run", "table.yaml"});
   WriteTable("79");
   const std::string out = ExpectDifferent();
   EXPECT_TRUE(Contains(out, "input differs: data " + (folder_ / "table.csv").string() + ": now "))
@@ -113,7 +111,7 @@ TEST_F(ReplayCli, NamesAPluginThatChanged) {
   fs::create_directory(folder_ / "own");
   fs::permissions(folder_ / "own", fs::perms::owner_all);
   fs::copy_file(ALIDADE_BINARY_DIR "/tests/faults/ratio.so", folder_ / "own/ratio.so");
-  Make({"run", "config.yaml", "--no-figures", "--plugin-path", "own", "--set",
+  Make({"run", "config.yaml", "--plugin-path", "own", "--set",
         "sensors.ratio={model: ratio, stream: inverse_scale, roles: {numerator: target.depth, "
         "denominator: template.inverse_distance}}"});
   ExpectEqual();
@@ -129,7 +127,7 @@ TEST_F(ReplayCli, NamesAPluginThatChanged) {
 }
 
 TEST_F(ReplayCli, NamesAConfigThatChanged) {
-  Make({"run", "config.yaml", "--no-figures"});
+  Make({"run", "config.yaml"});
   std::string config = Read("out/config.resolved.yaml");
   config.replace(config.find("0.999"), 5, "0.9");
   Write("out/config.resolved.yaml", config);
@@ -137,7 +135,7 @@ TEST_F(ReplayCli, NamesAConfigThatChanged) {
 }
 
 TEST_F(ReplayCli, NamesARowThatChanged) {
-  Make({"run", "config.yaml", "--no-figures"});
+  Make({"run", "config.yaml"});
   std::string rows = Read("out/ekf/estimates.csv");
   const std::size_t second = rows.find('\n') + 1;
   rows.replace(second, 3, "7.7");
@@ -169,13 +167,13 @@ TEST_F(ReplayCli, RefusesWhatCannotBeMadeAgain) {
       << none.err;
   WriteTable("80");
   before_ = "exec < table.csv";
-  Make({"run", "table.yaml", "--no-figures", "--set", "source.path=-"});
+  Make({"run", "table.yaml", "--set", "source.path=-"});
   before_.clear();
   const Outcome piped = Call({"replay", "out"});
   EXPECT_EQ(piped.code, 66);
   EXPECT_TRUE(Contains(piped.err, "the data came from '-', which can be read only once"))
       << piped.err;
-  Make({"run", "config.yaml", "--no-figures", "--force"});
+  Make({"run", "config.yaml", "--force"});
   std::string record = Read("out/run.json");
   record.replace(record.find("\"ok\""), 4, "\"stopped\"");
   Write("out/run.json", record);

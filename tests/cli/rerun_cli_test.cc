@@ -24,7 +24,7 @@ class Rerun : public testing::ProgramTest {
     }
   }
   void ExpectOk(Arguments arguments) const {
-    arguments.insert(arguments.end(), {"--no-figures", "--quiet"});
+    arguments.insert(arguments.end(), {"--quiet"});
     const Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
   }

@@ -107,7 +107,7 @@ TEST_F(SimulateCli, NothingReplacesTheDataThatItReads) {
   const Outcome included = Call({"simulate", "lens.yaml", "-o", "data", "--force"});
   EXPECT_EQ(included.code, 73);
   EXPECT_TRUE(Contains(included.err, "data: the folder contains the input '")) << included.err;
-  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out"}).code, 0);
   EXPECT_EQ(Call({"simulate", "out/config.resolved.yaml", "-o", "out", "--force"}).code, 73);
 }
 

@@ -39,14 +39,12 @@ TEST_F(SweepCli, AComparisonOverSeedsHasTheSameBytesForAnyNumberOfJobs) {
       const std::size_t clock = json.find(key);
       json.erase(clock, json.find('}', clock) - clock);
     }
-    for (const char* table : {"compare.md", "compare.tex", "report.html"}) {
+    for (const char* table : {"compare.md", "compare.tex"}) {
       std::string& text = all[table];
       const std::size_t row = text.find("CPU time [us/frame]");
       text.erase(row, text.find('\n', row) - row);
     }
-    std::erase_if(all, [](const auto& file) {
-      return file.first == "cost.csv" || file.first.starts_with("figures/cost");
-    });
+    for (const char* file : {"cost.csv", "report.html"}) all.erase(file);
     return all;
   };
   const auto one = files("1");
@@ -60,7 +58,7 @@ TEST_F(SweepCli, SummarisesRunsThatRunWouldGive) {
   EXPECT_EQ(sweep.code, 0) << sweep.err;
   EXPECT_TRUE(Contains(sweep.out, "rmse target.depth [mm]")) << sweep.out;
   EXPECT_TRUE(Contains(sweep.out, "coverage95 target.depth [%]")) << sweep.out;
-  EXPECT_EQ(Call({"run", "config.yaml", "--seed", "7", "-o", "run", "--no-figures"}).code, 0);
+  EXPECT_EQ(Call({"run", "config.yaml", "--seed", "7", "-o", "run"}).code, 0);
   const Config summary = Json("sweep/sweep.json"), record = Json("run/run.json");
   EXPECT_EQ(summary.root().At("runs").Number(), 1);
   EXPECT_EQ(summary.root().At("runs_used").Number(), 1);
@@ -164,7 +162,7 @@ TEST_F(SweepCli, InconsistentRunsCountAndAreTold) {
   arguments.insert(arguments.end(), too_sure.begin(), too_sure.end());
   const Outcome sweep = Call(arguments);
   ASSERT_EQ(sweep.code, 0) << sweep.err;
-  arguments = {"run", "config.yaml", "--seed", "7", "-o", "run", "--no-figures"};
+  arguments = {"run", "config.yaml", "--seed", "7", "-o", "run"};
   arguments.insert(arguments.end(), too_sure.begin(), too_sure.end());
   ASSERT_EQ(Call(arguments).code, 0);
   const Config summary = Json("out/sweep.json"), record = Json("run/run.json");
@@ -238,31 +236,25 @@ TEST_F(SweepCli, EachValueOfAKeyIsSweptAsIfItWereSet) {
   EXPECT_TRUE(Contains(table, "\n2,3,0,0,")) << table;
 }
 
-TEST_F(SweepCli, ValuesMayBeMapsAndTheirFigureIsDrawn) {
+TEST_F(SweepCli, ValuesMayBeMaps) {
   const Outcome varied =
       Call({"sweep", "config.yaml", "--runs", "2", "-o", "out", "--vary",
             "estimators.ekf.rejection_recovery={after: 5, action: none},{after: 6}"});
   ASSERT_EQ(varied.code, 0) << varied.err;
   EXPECT_EQ(Json("out/sweep.json").root().At("values").Items().size(), 2u);
-  const bool drawn = Exists("out/figures/vary.svg");
-  EXPECT_EQ(drawn, !Contains(varied.err, "no figure was drawn: gnuplot is not installed"))
-      << varied.err;
-  if (!drawn) GTEST_SKIP() << "gnuplot is not installed";
-  const std::string figure = Read("out/figures/vary.svg");
-  EXPECT_TRUE(Contains(figure, "rmse target.depth: mean, 5 % to 95 %")) << figure.substr(0, 2000);
-  EXPECT_TRUE(Contains(figure, "after: 5, action: none")) << "the axis must show the swept values";
+  const std::string page = Read("out/report.html");
+  EXPECT_TRUE(Contains(page, "\"value\":\"{after: 5, action: none}\",\"label\":"));
+  EXPECT_TRUE(varied.out.ends_with("\nreport   out/report.html\n")) << varied.out;
 }
 
-TEST_F(SweepCli, TheErrorOfTheMapIsInTablesAndFigure) {
+TEST_F(SweepCli, TheErrorOfTheMapIsInTablesAndPage) {
   const Outcome varied =
       Call({"sweep", ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml", "--runs", "1", "-o",
             "out", "--vary", "sensors.pixels.sigma_px=1,2"});
   ASSERT_EQ(varied.code, 0) << varied.err;
   EXPECT_TRUE(Contains(varied.out, "map.rmse [mm]")) << varied.out;
   EXPECT_TRUE(Contains(Read("out/sweep.csv"), "ekf.mean:map.rmse"));
-  const std::string figure = Read("out/figures/vary.gp");
-  EXPECT_TRUE(Contains(figure, "set label 1 'map.rmse: mean, 5 % to 95 %'")) << figure;
-  EXPECT_TRUE(Contains(figure, "column('ekf.mean:map.rmse')")) << figure;
+  EXPECT_TRUE(Contains(Read("out/report.html"), "\"map.rmse\":\"zero\""));
 }
 
 TEST_F(SweepCli, SeveralKeysTakeEachValueAndTheReprojectionErrorOfEachIsACurve) {
@@ -271,19 +263,19 @@ TEST_F(SweepCli, SeveralKeysTakeEachValueAndTheReprojectionErrorOfEachIsACurve) 
   const Outcome varied = Call({"sweep", config, "--runs", "1", "--first-seed", "3", "-o", "out",
                                "--set", "source.max_frames=20", "--vary", keys + "=0.5,2"});
   ASSERT_EQ(varied.code, 0) << varied.err;
-  std::string rows = keys + ",estimator,sensor,frame,runs,rms\n";
+  std::string rows = keys + ",estimator,sensor,unit,frame,runs,rms\n";
   for (const std::string value : {"0.5", "2"}) {
-    const Outcome run = Call({"run", config, "--seed", "3", "-o", "run" + value, "--no-figures",
-                              "--set", "source.max_frames=20", "--set", "source.sigma_px=" + value,
-                              "--set", "sensors.pixels.sigma_px=" + value});
+    const Outcome run =
+        Call({"run", config, "--seed", "3", "-o", "run" + value, "--set", "source.max_frames=20",
+              "--set", "source.sigma_px=" + value, "--set", "sensors.pixels.sigma_px=" + value});
     ASSERT_EQ(run.code, 0) << run.err;
     std::istringstream lines(Rows(Read("run" + value + "/ekf/reprojection.csv")));
     int frame = 0;
     for (std::string line; std::getline(lines, line);) {
       if (!Contains(line, ",pixels,")) continue;
       // In the first frame no landmark has been initialised, so there is no innovation.
-      if (frame == 0) rows += value + ",ekf,pixels,1,0,\n", frame = 1;
-      rows += value + ",ekf,pixels," + std::to_string(++frame) + ",1," +
+      if (frame == 0) rows += value + ",ekf,pixels,px,1,0,\n", frame = 1;
+      rows += value + ",ekf,pixels,px," + std::to_string(++frame) + ",1," +
               line.substr(line.rfind(',') + 1) + '\n';
     }
   }
@@ -293,9 +285,7 @@ TEST_F(SweepCli, SeveralKeysTakeEachValueAndTheReprojectionErrorOfEachIsACurve) 
     if (!Contains(line, ",known,")) found += line + '\n';
   }
   EXPECT_EQ(found, rows);
-  const bool drawn = Exists("out/figures/reprojection.svg");
-  EXPECT_EQ(drawn, !Contains(varied.err, "no figure was drawn")) << varied.err;
-  EXPECT_EQ(drawn, Contains(varied.out, "out/figures/reprojection.svg")) << varied.out;
+  EXPECT_TRUE(Contains(Read("out/report.html"), "\"sensor\":\"pixels\",\"unit\":\"px\""));
 }
 
 TEST_F(SweepCli, AKeyIsNotGivenTwice) {
@@ -487,7 +477,7 @@ TEST_F(SweepCli, StopsAtASignalWithTheRunsThatAreComplete) {
   const Outcome stopped = Wait(sweep);
   EXPECT_EQ(stopped.code, 75) << stopped.err;
   EXPECT_FALSE(Exists("out"));
-  EXPECT_TRUE(Contains(stopped.out, "\nwrote out.partial\n")) << stopped.out;
+  EXPECT_TRUE(Contains(stopped.out, "\nreport   out.partial/report.html\n")) << stopped.out;
   const Config summary = Json("out.partial/sweep.json");
   EXPECT_EQ(summary.root().At("runs").Number(), 1e6);
   EXPECT_EQ(summary.root().At("status").Text(), "stopped");

@@ -120,8 +120,7 @@ TEST_F(VaryFilterCli, ASweepNamesItsWorstSeedsAndHowToRepeatThem) {
   ASSERT_NE(found, std::string::npos) << sweep.out;
   const std::string seed = sweep.out.substr(found + start.size(),
                                             sweep.out.find('\n', found + 1) - found - start.size());
-  const Outcome run =
-      Call({"run", "sweep/config.resolved.yaml", "--seed", seed, "-o", "run", "--no-figures"});
+  const Outcome run = Call({"run", "sweep/config.resolved.yaml", "--seed", seed, "-o", "run"});
   ASSERT_EQ(run.code, 0) << run.err;
   const Config record = Json("run/run.json");
   const double nees =

@@ -286,10 +286,6 @@ const Fault kEstimatorFaults[] = {
               {After(kEkf, "  other: {type: ekf, use: {accepted_by: efk}}")}, 31,
               "estimators.other.use.accepted_by: estimator 'efk' does not exist; expected a name "
               "from `estimators`; did you mean 'ekf'?"),
-    MakeFault("10_estimator_name_taken", "depth", {{"ekf: {type: ekf}", "figures: {type: ekf}"}},
-              30,
-              "estimators.figures: 'figures' cannot name an estimator, because the run folder uses "
-              "this name"),
     MakeFault("10_gate_one", "depth", {{kEkf, "{type: ekf, gate: 1, fuse: joint}"}}, 30,
               "estimators.ekf.gate: '1' is out of range; expected a number in (0, 1), or none"),
     MakeFault("10_gate_zero", "depth", {{kEkf, "{type: ekf, gate: 0, fuse: joint}"}}, 30,
@@ -468,7 +464,7 @@ class ConfigText : public ProgramTest {
  protected:
   Outcome RunText(const std::string& text) const {
     Write("text.yaml", text);
-    return Call({"run", "text.yaml", "-o", "out", "--no-figures", "--force"});
+    return Call({"run", "text.yaml", "-o", "out", "--force"});
   }
 };
 

@@ -40,7 +40,7 @@ class DataFault : public testing::ProgramTest {
   }
   /// Runs `config` with the output `out`. Expects the exit code `code`.
   Outcome Run(const std::string& config, testing::Arguments more = {}, int code = 0) {
-    testing::Arguments arguments = {"run", config, "--no-figures", "--force", "-o", "out"};
+    testing::Arguments arguments = {"run", config, "--force", "-o", "out"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, code) << outcome.err;
@@ -189,9 +189,9 @@ TEST_F(DataFault, WhatIsNoDataIsExitCode65WithThePlace) {
 TEST_F(DataFault, AnErrorFollowsTheTableAndShowsTheLine) {
   Write("table.csv", "t_s,d\n0,80\n0.1,abc\n0.2,81\n");
   before_ = "exec 1>both 2>&1";
-  EXPECT_EQ(Call({"run", "table.yaml", "--no-figures", "-o", "out"}).code, 65);
+  EXPECT_EQ(Call({"run", "table.yaml", "-o", "out"}).code, 65);
   const std::string both = Read("both");
-  EXPECT_TRUE(Contains(both, "\nwrote out\n")) << both;
+  EXPECT_TRUE(Contains(both, "\nreport   out/report.html\n")) << both;
   EXPECT_TRUE(both.ends_with(
       "table.csv:3:5 d: 'abc' is not a number; expected a finite number, or 'source.missing: "
       "[\"\", abc]'\n  3 | 0.1,abc\n    |     ^\n"))
@@ -281,7 +281,7 @@ TEST_F(DataFault, AFileThatChangesWhileItIsReadIsExitCode74) {
   for (const char* config : {"table.yaml", "map.yaml"}) {
     const std::string file = config[0] == 't' ? "table.csv" : "tracks.csv";
     Write(file, config[0] == 't' ? rows : tracks);
-    const pid_t run = Start({"run", config, "--no-figures", "--force", "-o", "out"});
+    const pid_t run = Start({"run", config, "--force", "-o", "out"});
     EXPECT_TRUE(Eventually([&] { return Exists("out.partial/ekf/estimates.csv"); }));
     std::ofstream(folder_ / file, std::ios::app) << "# one more\n";
     const Outcome outcome = Wait(run);

@@ -18,7 +18,7 @@ TEST_F(KilledRun, LeavesItsRowsAndARecordThatSaysRunning) {
     ASSERT_EQ(::write(pipe, rows.data(), rows.size()), std::ssize(rows));
   };
   feed("t_s,d\n0,80\n");
-  const pid_t run = Start({"run", "table.yaml", "--no-figures", "-o", "out"});
+  const pid_t run = Start({"run", "table.yaml", "-o", "out"});
   // The run writes its rows to the file once a second, at the arrival of the next row.
   int row = 0;
   ASSERT_TRUE(Eventually([&] {
@@ -32,14 +32,14 @@ TEST_F(KilledRun, LeavesItsRowsAndARecordThatSaysRunning) {
   EXPECT_EQ(Json("out.partial/run.json").root().At("status").Text(), "running");
   const std::string rows = Read("out.partial/ekf/estimates.csv");
 
-  const Outcome refused = Call({"run", "config.yaml", "-o", "out", "--no-figures"});
+  const Outcome refused = Call({"run", "config.yaml", "-o", "out"});
   EXPECT_EQ(refused.code, 73);
   EXPECT_EQ(refused.err,
             "error: out.partial: exists already: another command ended before it completed this "
             "folder, or is still running; "
             "add --force to replace this folder, or remove it\n");
   EXPECT_EQ(Read("out.partial/ekf/estimates.csv"), rows);
-  EXPECT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures", "--force"}).code, 0);
+  EXPECT_EQ(Call({"run", "config.yaml", "-o", "out", "--force"}).code, 0);
   EXPECT_FALSE(Exists("out.partial"));
 }
 

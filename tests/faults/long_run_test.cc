@@ -18,7 +18,7 @@ class LongRun : public testing::ProgramTest {
  protected:
   /// Returns the peak resident memory of a run of `config` in KiB.
   long PeakOf(const std::string& config, testing::Arguments settings) {
-    testing::Arguments arguments = {"run", config, "--no-figures", "--force", "-o", "out"};
+    testing::Arguments arguments = {"run", config, "--force", "-o", "out"};
     for (std::string& setting : settings) {
       arguments.insert(arguments.end(), {"--set", std::move(setting)});
     }
@@ -107,8 +107,8 @@ TEST_F(LongRun, APipeIsTakenAsItGrows) {
     ASSERT_EQ(::write(pipe, rows.data(), rows.size()), static_cast<ssize_t>(rows.size()));
   };
   feed(0);
-  const pid_t run = Start({"run", kBench + "stream.yaml", "--no-figures", "--follow", "-o", "out",
-                           "--set", "source.path=" + (folder_ / "pipe").string()});
+  const pid_t run = Start({"run", kBench + "stream.yaml", "--follow", "-o", "out", "--set",
+                           "source.path=" + (folder_ / "pipe").string()});
   constexpr int kFrames = 30;
   for (int k = 1; k <= kFrames; ++k) {
     feed(k);

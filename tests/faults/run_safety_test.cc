@@ -46,7 +46,7 @@ class RunSafety : public ProgramTest {
 
 // Tests fault 88 of tests/faults/README.md.
 TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
-  ASSERT_EQ(Call({"run", "config.yaml", "-o", "whole", "--no-figures"}).code, 0);
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "whole"}).code, 0);
   std::uintmax_t largest = 0;
   for (const auto& entry : fs::recursive_directory_iterator(folder_ / "whole")) {
     if (entry.is_regular_file()) largest = std::max(largest, entry.file_size());
@@ -56,7 +56,7 @@ TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
   for (std::uintmax_t blocks = 0; blocks <= largest / 512 + 1; blocks += 1 + blocks / 3) {
     // `ulimit -f` counts blocks of 512 bytes.
     before_ = "ulimit -f " + std::to_string(blocks) + "; exec 2>/dev/null >/dev/null";
-    const Outcome run = Call({"run", "config.yaml", "-o", "out", "--no-figures"});
+    const Outcome run = Call({"run", "config.yaml", "-o", "out"});
     EXPECT_EQ(run.signal, 0) << blocks;
     const bool fits = blocks * 512 >= largest;
     EXPECT_EQ(run.code, fits ? 0 : 74) << blocks;
@@ -68,7 +68,7 @@ TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
   EXPECT_GT(refused, 5);
   EXPECT_GT(kept, 5);
   before_ = "ulimit -f 12";
-  const Outcome run = Call({"run", "config.yaml", "-o", "out", "--no-figures", "--force"});
+  const Outcome run = Call({"run", "config.yaml", "-o", "out", "--force"});
   EXPECT_TRUE(run.err.starts_with("error: out.partial/")) << run.err;
   EXPECT_TRUE(Contains(run.err, ": cannot write: File too large\n")) << run.err;
   const Config record = Json("out.partial/run.json");
@@ -80,7 +80,7 @@ TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
 
 // Tests fault 89 of tests/faults/README.md.
 TEST_F(RunSafety, AReaderThatIsGoneIsAnErrorNotASignal) {
-  for (const Arguments& command : {Arguments{"run", "config.yaml", "-o", "out", "--no-figures"},
+  for (const Arguments& command : {Arguments{"run", "config.yaml", "-o", "out"},
                                    {"sweep", "config.yaml", "--runs", "1", "-o", "sweep"},
                                    {"explain", "config.yaml"},
                                    {"plugins", "list"},
@@ -103,7 +103,7 @@ TEST_F(RunSafety, AReaderThatIsGoneIsAnErrorNotASignal) {
 
 // Tests fault 92 of tests/faults/README.md.
 TEST_F(RunSafety, WhatIsThereIsReplacedByForceOnly) {
-  const Arguments run = {"run", "config.yaml", "-o", "out", "--no-figures"};
+  const Arguments run = {"run", "config.yaml", "-o", "out"};
   ASSERT_EQ(Call(run).code, 0);
   const std::string before = Estimates("out");
   Arguments other = run;
@@ -120,11 +120,11 @@ TEST_F(RunSafety, WhatIsThereIsReplacedByForceOnly) {
 // Tests fault 92 of tests/faults/README.md: --force does not delete runs inside the folder of a
 // run.
 TEST_F(RunSafety, ForceSparesRunsInsideARun) {
-  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
-  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out/base", "--no-figures"}).code, 0);
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out"}).code, 0);
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out/base"}).code, 0);
   ASSERT_EQ(Call({"sweep", "config.yaml", "--runs", "1", "-o", "out/ekf/sweep"}).code, 0);
   for (const Arguments& command :
-       {Arguments{"run", "config.yaml", "--no-figures"}, {"sweep", "config.yaml", "--runs", "1"}}) {
+       {Arguments{"run", "config.yaml"}, {"sweep", "config.yaml", "--runs", "1"}}) {
     Arguments all = command;
     all.insert(all.end(), {"-o", "out", "--force"});
     const Outcome refused = Call(all);
@@ -170,8 +170,8 @@ TEST_F(RunSafety, MemoryThatRunsOutIsAnErrorAndARecord) {
     fs::remove_all(folder_ / "out");
     before_ = "ulimit -c 0; ulimit -v " + std::to_string(kib);
     if (!Starts()) continue;
-    const Outcome run = Call(
-        {"run", "config.yaml", "-o", "out", "--no-figures", "--set", "source.duration_s=2000"});
+    const Outcome run =
+        Call({"run", "config.yaml", "-o", "out", "--set", "source.duration_s=2000"});
     EXPECT_EQ(run.signal, 0) << kib << " KiB: " << run.err;
     if (run.code == 0) break;
     if (run.code == 127) continue;  // the dynamic loader ran out of memory

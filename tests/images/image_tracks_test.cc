@@ -951,7 +951,7 @@ source: {type: image_tracks, path: scene/images, rate_hz: 30, features: 60, know
 estimators: {ekf: {type: ekf, gate: 0.999}}
 )");
   const auto scale = [&](const testing::Arguments& more) {
-    testing::Arguments arguments{"run", "config.yaml", "-o", "run", "--force", "--no-figures"};
+    testing::Arguments arguments{"run", "config.yaml", "-o", "run", "--force"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const Outcome run = Call(arguments);
     EXPECT_EQ(run.code, 0) << run.err;
@@ -989,8 +989,8 @@ TEST_F(ImageTracks, AKnownTargetGivesARecordedDeskItsScale) {
   }
   const std::string example =
       std::string(ALIDADE_SOURCE_DIR) + "/examples/29_slam_recorded_images/config.yaml";
-  const Outcome run = Call(
-      {"run", example, "--set", "source.path=" + frames.string(), "-o", "run", "--no-figures"});
+  const Outcome run =
+      Call({"run", example, "--set", "source.path=" + frames.string(), "-o", "run"});
   ASSERT_EQ(run.code, 0) << run.err;
   std::map<int, std::array<double, 3>> place;
   std::istringstream rows(Read("run/ekf/landmarks.csv"));

@@ -56,7 +56,7 @@ class RunView : public testing::ProgramTest {
  protected:
   Outcome Run(const std::string& config, testing::Arguments more) {
     Write("plate.yaml", config);
-    more.insert(more.begin(), {"run", "plate.yaml", "-o", "run", "--no-figures"});
+    more.insert(more.begin(), {"run", "plate.yaml", "-o", "run"});
     return Call(more);
   }
   std::vector<cv::Mat> Frames(const std::string& name) const {

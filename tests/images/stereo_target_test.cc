@@ -139,9 +139,8 @@ estimators: {ekf: {type: ekf}}
   // The sensor entry has a sigma of 50 px. If the variances of the measurements were ignored,
   // disparity would hardly change the depth.
   const auto rmse_mm = [&](const char* estimate) {
-    const Outcome outcome =
-        Call({"run", "run.yaml", "-o", "run", "--force", "--set",
-              std::string("source.estimate_noise=") + estimate, "--no-figures"});
+    const Outcome outcome = Call({"run", "run.yaml", "-o", "run", "--force", "--set",
+                                  std::string("source.estimate_noise=") + estimate});
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     const std::string table = Read("run/comparison.csv");
     const std::string key = "rmse:target.depth,";
@@ -462,7 +461,7 @@ TEST_F(StereoTarget, Example28IsBetterThanItsSimulatedNoise) {
                              "source.duration_s=1.8"});
   ASSERT_EQ(made.code, 0) << made.err;
   const auto run = [&](testing::Arguments arguments) {
-    arguments.insert(arguments.begin(), {"run", "--no-figures"});
+    arguments.insert(arguments.begin(), {"run"});
     const Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
   };

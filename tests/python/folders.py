@@ -71,8 +71,8 @@ class Folders(unittest.TestCase):
         (cls.root / "poses.yaml").write_text(POSES)
         compare = ("compare", "config.yaml", "--no-decomposition", "--quiet")
         for arguments in (
-            ("run", "config.yaml", "--no-figures", "--quiet", "--covariances", "-o", "run"),
-            ("run", "poses.yaml", "--no-figures", "--quiet", "--covariances", "-o", "poses"),
+            ("run", "config.yaml", "--quiet", "--covariances", "-o", "run"),
+            ("run", "poses.yaml", "--quiet", "--covariances", "-o", "poses"),
             ("sweep", "config.yaml", "--runs", "5", "--quiet", "-o", "sweep"),
             ("sweep", "config.yaml", "--runs", "3", "--quiet", "-o", "vary",
              "--vary", "source.duration_s=1,2,3"),

@@ -98,9 +98,8 @@ inline Config MakeConfig() {
   return Config::FromText("alidade: 1\ntitle: A <swinging> target\n", "swing.yaml");
 }
 
-inline Recorder::Options OptionsFor(const fs::path& folder, bool force = false,
-                                    bool figures = false) {
-  return {folder, force, figures, "alidade run swing.yaml"};
+inline Recorder::Options OptionsFor(const fs::path& folder, bool force = false) {
+  return {folder, force, "alidade run swing.yaml"};
 }
 
 /// Runs the experiment with `recorder` as the observer.

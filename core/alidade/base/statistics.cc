@@ -124,6 +124,15 @@ double Quantile(const std::vector<double>& ascending, double q) {
   return fraction == 0.0 || low == high ? low : low + fraction * (high - low);
 }
 
+Interval ShareInterval(std::int64_t successes, std::int64_t trials) {
+  constexpr double kZ = 1.959963984540054;
+  const auto n = static_cast<double>(trials);
+  const double share = static_cast<double>(successes) / n, z2 = kZ * kZ / n;
+  const double centre = share + z2 / 2.0;
+  const double half = kZ * std::sqrt(share * (1.0 - share) / n + z2 / (4.0 * n));
+  return {std::max(0.0, (centre - half) / (1.0 + z2)), std::min(1.0, (centre + half) / (1.0 + z2))};
+}
+
 Spread SpreadOf(std::vector<double> values) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   std::erase_if(values, [](double value) { return std::isnan(value); });

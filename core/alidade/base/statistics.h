@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -38,6 +39,12 @@ enum class ScaleTest { kPassed, kTooLarge, kTooSmall };
 /// It is too small if it is below chi2(8e-7, nu) / nu and at most 1.15^-2. n need not be an
 /// integer. The probability of a false alarm is 1.6e-6.
 ScaleTest TestScale(double mean, double dof, double n);
+
+/// Returns the 95 % interval of a probability p, of which k successes in n > 0 trials are known
+/// [Wilson1927]. With z = 1.96 and f = k / n:
+///
+///   (f + z^2 / 2n +- z sqrt(f (1 - f) / n + z^2 / 4n^2)) / (1 + z^2 / n)
+Interval ShareInterval(std::int64_t successes, std::int64_t trials);
 
 /// Returns the q-quantile of the ascending values x[0..n-1], n > 0. q is in [0, 1]. Interpolates
 /// linearly between the values (type 7 of Hyndman and Fan):

@@ -16,6 +16,9 @@ std::string WithArticle(const std::string& noun);
 /// Returns `text` with its ASCII letters in lower case, in any locale.
 std::string LowerCase(std::string_view text);
 
+/// Returns `text` as one word of a shell command.
+std::string ShellWord(const std::string& text);
+
 /// Returns the member `name` of each element.
 template <class Range>
 std::vector<std::string> NamesOf(const Range& elements) {

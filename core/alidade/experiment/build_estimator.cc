@@ -74,14 +74,6 @@ bool ExpectsPoor(const Node& entry) {
   return expect && expect->Choice({"good", "poor"}) == 1;
 }
 
-void CheckName(const std::string& name, const Node& entry) {
-  ExpectName(name, entry, "an estimator");
-  if (name == "figures") {
-    entry.Fail("'figures' cannot name an estimator, because the run folder uses this name",
-               "another name");
-  }
-}
-
 [[noreturn]] void FailUnknownType(const std::string& name, const PluginHost& host,
                                   const Node& node) {
   std::vector<std::string> of_core, of_plugins;
@@ -284,7 +276,7 @@ void CheckCanRollBack(const EstimatorSpec& spec, const Node& entry) {
 EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const Config& config,
                              const PluginHost& host, const std::vector<StreamInfo>* streams,
                              const std::vector<EstimatorSpec>& earlier_estimators) {
-  CheckName(name, entry);
+  ExpectName(name, entry, "an estimator");
   entry.ExpectMap("{type: ekf}");
   EstimatorSpec spec;
   spec.name = name;

@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace alidade {
 
@@ -29,5 +30,18 @@ struct MetricKey {
     return name + (subject.empty() ? "" : ':' + subject) + (segment.empty() ? "" : '@' + segment);
   }
 };
+
+/// Returns the key of the error that ranks estimators: the RMSE of the first position or depth, or
+/// else the first RMSE over the whole run. Returns "" if `keys` contains no RMSE.
+inline std::string MainErrorKey(const std::vector<std::string>& keys) {
+  std::string main;
+  for (const std::string& text : keys) {
+    const MetricKey key = MetricKey::Parse(text);
+    if (key.name != "rmse" || !key.segment.empty()) continue;
+    if (key.subject.ends_with("position") || key.subject.ends_with("depth")) return text;
+    if (main.empty()) main = text;
+  }
+  return main;
+}
 
 }  // namespace alidade

@@ -327,6 +327,16 @@ std::string MainTable(const RunResult& result, const std::vector<std::string>& s
          (omitted > 0 ? '\n' + std::to_string(omitted) + " more rows: --all\n" : "");
 }
 
+std::string ValueText(const std::string& key, double value, const std::string& unit) {
+  RunResult result;
+  EstimatorResult& estimator = result.estimators.emplace_back();
+  const MetricKey parsed = MetricKey::Parse(key);
+  estimator.metrics[key] = value;
+  estimator.units[parsed.subject] = unit;
+  const ScaledUnit scaled = ScaledUnitOf(result, parsed);
+  return RoundedText(value * scaled.factor, 3) + (scaled.unit.empty() ? "" : ' ' + scaled.unit);
+}
+
 std::string ReferenceText(const RunResult& result) {
   if (!result.withheld.empty()) return result.withheld;
   if (result.reference == "truth") return "";

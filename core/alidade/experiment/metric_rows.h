@@ -32,6 +32,9 @@ std::string MainTable(const RunResult& result, const std::vector<std::string>& s
 /// Returns the rows of the metrics with this name over the whole run. Replaces the name by `label`.
 std::vector<TableRow> RowsOf(const RunResult& result, const std::string& name,
                              const std::string& label);
+/// Formats a value of the metric `key` with its unit, as in `2.04 mm`. `unit` is the unit of the
+/// subject of the metric.
+std::string ValueText(const std::string& key, double value, const std::string& unit);
 /// Returns a sentence about the reference of the errors; "" if the reference is truth.
 std::string ReferenceText(const RunResult& result);
 

@@ -13,9 +13,6 @@ TEST(SectionsText, NamesAreQuotedWhereTheFormAsksForIt) {
   EXPECT_EQ(SectionsText({section}, TableStyle::kLatex),
             "\\paragraph{A \\& b}\n\n\\begin{tabular}{lrr}\n\\hline\n & x|y & z \\\\\n"
             "\\hline\nr\\_1|\\textbackslash{} & 1 & 2 \\% \\\\\n\\hline\n\\end{tabular}\n");
-  EXPECT_EQ(SectionsText({section}, TableStyle::kHtml),
-            "<h3>A &amp; b</h3>\n<div class=\"scroll\"><table>\n<tr><th></th><th>x|y</th><th>z</th>"
-            "</tr>\n<tr><td>r_1|\\</td><td>1</td><td>2 %</td></tr>\n</table></div>\n");
 }
 
 }  // namespace

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests errors.csv and its figures, which contain the error of each element with truth.
+// Tests errors.csv, which contains the error of each element with truth.
 #include "alidade/record/errors_file.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "alidade/record/error_figure.h"
 #include "support/recording.h"
 #include "support/systems.h"
 
@@ -65,7 +64,6 @@ TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
   internal::RunColumns columns;
   internal::ErrorsFile file(out, "ekf", Layouts({0, 1, 2, -1}), columns);
   Add(file);  // no block has a value yet
-  EXPECT_FALSE(file.elements()[0].is_known);
   AddBlocks();
   Add(file);
   Add(file, false);
@@ -95,32 +93,6 @@ TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
   EXPECT_NEAR(std::stod(Cells(lines[3])[13]), 400.0 / 3.0, 1e-9);  // the position is unknown
 }
 
-TEST_F(ErrorsOfACamera, IsDrawnInItsBandAndOrientationsInDegrees) {
-  const TemporaryFolder folder;
-  internal::OutputFolder out(folder / "out", false);
-  internal::RunColumns columns;
-  internal::ErrorsFile file(out, "ekf", Layouts({0, 1, 2, -1}), columns);
-  AddBlocks();
-  Add(file);
-  internal::RecordedEstimator estimator;
-  estimator.name = "ekf";
-  estimator.errors = file.elements();
-  const auto figures = internal::ErrorFigures({}, estimator);
-  ASSERT_EQ(figures.size(), 1u);
-  EXPECT_EQ(figures[0].name(), "ekf.errors");
-  const std::string script = figures[0].Text();
-  for (const char* part :
-       {"set label 1 'cam.position.1'", "set ylabel '[m]'",
-        "(-3 * column('sigma:cam.position.1')):(3 * column('sigma:cam.position.1')) with filled",
-        "(column('cam.position.1')) with lines", "set label 1 'cam.orientation.rz'",
-        "set ylabel '[deg]'", "(column('cam.orientation.rz') * 180 / pi) with lines",
-        "(3 * column('sigma:cam.orientation.rz') * 180 / pi) with filled",
-        "(column('cam.heading') * 180 / pi) with lines"}) {
-    EXPECT_NE(script.find(part), std::string::npos) << part << '\n' << script;
-  }
-  EXPECT_EQ(script.find("sigma:cam.heading"), std::string::npos);  // a known value has no sigma
-}
-
 TEST_F(ErrorsOfACamera, WithoutTruthIsNoFile) {
   const TemporaryFolder folder;
   internal::OutputFolder out(folder / "out", false);
@@ -132,7 +104,6 @@ TEST_F(ErrorsOfACamera, WithoutTruthIsNoFile) {
   out.Write("other.csv", "");
   out.Commit();
   EXPECT_FALSE(fs::exists(folder / "out/ekf"));
-  EXPECT_TRUE(internal::ErrorFigures({}, {}).empty());
 }
 
 }  // namespace

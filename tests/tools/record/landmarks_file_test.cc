@@ -270,58 +270,6 @@ TEST(LandmarkRecords, TheReprojectionErrorOfEachFrameIsWritten) {
   EXPECT_NEAR(std::stod(last[3]), std::sqrt(sum / 12.0), 1e-12);
 }
 
-TEST(LandmarkRecords, TheMapIsDrawnBesideTruth) {
-  const TemporaryFolder folder;
-  Experiment experiment = OnTheStreet();
-  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
-  recorder.Finish(RunInto(recorder, experiment));
-  EXPECT_TRUE(recorder.note() == "" || recorder.note().ends_with("not installed"))
-      << recorder.note();
-  const std::string map = Read(folder / "out/figures/ekf.map.gp");
-  EXPECT_NE(map.find("? column('true_x') : NaN):(column('true_y')) with points ls 18"),
-            std::string::npos)
-      << map;
-  for (const char* part : {"(column('cam.position.x')):(column('cam.position.y')) with lines",
-                           "(column('cam.position.x')):(column('cam.position.z')) with lines",
-                           "(column('cam.position.y')):(column('cam.position.z')) with lines",
-                           "? column('x') : NaN):(column('z')):(3 * column('sigma_x')):(3 * "
-                           "column('sigma_z')) with xy",
-                           "set size ratio -1", "set multiplot layout 2,2"}) {
-    EXPECT_NE(map.find(part), std::string::npos) << part << '\n' << map;
-  }
-  EXPECT_EQ(map.find("removed, +-3"), std::string::npos) << map;  // no landmark was removed
-  EXPECT_NE(Read(folder / "out/figures/ekf.reprojection.gp").find("column('rms')"),
-            std::string::npos);
-}
-
-TEST(LandmarkRecords, RemovedLandmarksAreDrawnPaler) {
-  const TemporaryFolder folder;
-  Experiment experiment = OfOneThatPasses();
-  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
-  recorder.Finish(RunInto(recorder, experiment));
-  EXPECT_TRUE(recorder.note() == "" || recorder.note().ends_with("not installed"))
-      << recorder.note();
-  const std::string map = Read(folder / "out/figures/ekf.map.gp");
-  EXPECT_NE(
-      map.find(
-          "(strcol('status') eq 'removed' ? column('x') : NaN):(column('y')) with points ls 20"),
-      std::string::npos)
-      << map;
-  // Removed landmarks have no error bars. On a long drive the bars would hide everything else.
-  EXPECT_EQ(map.find("removed, +-3"), std::string::npos) << map;
-}
-
-TEST(LandmarkRecords, TheMeasurementsOfOneTimestampAreNotJoinedByALine) {
-  const TemporaryFolder folder;
-  Experiment experiment = OnTheStreet();
-  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
-  recorder.Finish(RunInto(recorder, experiment));
-  const std::string script = Read(folder / "out/figures/measurements.gp");
-  EXPECT_NE(script.find("with points ls 13 title 'measured'"), std::string::npos) << script;
-  // A prediction would be hidden behind the points.
-  EXPECT_EQ(script.find("predicted: "), std::string::npos) << script;
-}
-
 TEST(MapMetrics, ASimilarityIsNoErrorAfterAlignment) {
   const Street source;
   const Eigen::AngleAxisd turn(0.3, Eigen::Vector3d(1, 2, 3).normalized());

@@ -25,7 +25,7 @@ estimators: {ekf: {type: ekf, gate: 0.999}}
 )";
 
 void RecordAll(const fs::path& folder) {
-  Record(OptionsFor(folder / "run", false, true));
+  Record(OptionsFor(folder / "run"));
   const Config config = Config::FromText(kConfig, "locale.yaml");
   SweepFolder sweep(folder / "sweep", false);
   SweepOptions options;

@@ -7,7 +7,6 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/io/sha256.h"
-#include "alidade/record/report_html.h"
 #include "alidade/replay/replay.h"
 #include "alidade/replay/run_inputs.h"
 #include "sensors/stereo_disparity.h"
@@ -71,10 +70,6 @@ TEST(Recorder, ColumnsJsonHasTheHeaderOfEveryCsvFile) {
   EXPECT_EQ(sigma.At("unit").Text(), "m");
   EXPECT_EQ(sigma.At("quantity").Text(), "sigma");
   EXPECT_EQ(sigma.At("subject").Text(), "target.depth");
-}
-
-TEST(HtmlEscaped, IsUtf8WhateverIsInTheText) {
-  EXPECT_EQ(internal::HtmlEscaped("<\xC3\xA9 & \xFF\x1B\n\t>"), "&lt;\xC3\xA9 &amp; ??\n\t&gt;");
 }
 
 TEST(Recorder, EstimatesRoundTrip) {
@@ -417,8 +412,8 @@ TEST(Recorder, SaysWhatFailedBeforeTheExperimentWasKnown) {
 
 TEST(Recorder, SameRunGivesSameBytes) {
   const TemporaryFolder folder;
-  Record(OptionsFor(folder / "one", false, true));
-  Record(OptionsFor(folder / "another", false, true));
+  Record(OptionsFor(folder / "one"));
+  Record(OptionsFor(folder / "another"));
   const std::vector<std::string> files = FilesIn(folder / "one");
   EXPECT_EQ(files, FilesIn(folder / "another"));
   for (const std::string& file : files) {

@@ -60,8 +60,8 @@ TEST(RunInputs, NameWhatDiffers) {
   ASSERT_EQ(other.size(), 1u);
   EXPECT_TRUE(other[0].starts_with("data " + data + ": now ")) << other[0];
   Written(folder / "a.csv", "1\n");
-  EXPECT_EQ(Differences(before, InputsOf(data, {plugin}, {"run", "--no-figures"})),
-            (std::vector<std::string>{"command: now 'run --no-figures', was 'run'"}));
+  EXPECT_EQ(Differences(before, InputsOf(data, {plugin}, {"run", "--covariances"})),
+            (std::vector<std::string>{"command: now 'run --covariances', was 'run'"}));
 }
 
 TEST(RunInputs, AFolderOfDataStandsForItsFiles) {

@@ -127,7 +127,7 @@ class PageTest(unittest.TestCase):
         self.assertNotIn("[object", self.script("return document.body.innerText"))
 
     def open_depth(self):
-        return self.open("depth", "run", "05_depth_principled/compare.yaml", "--no-figures")
+        return self.open("depth", "run", "05_depth_principled/compare.yaml")
 
     def test_depth_run(self):
         folder = self.open_depth()
@@ -157,7 +157,7 @@ class PageTest(unittest.TestCase):
         self.assertAlmostEqual(mean, expected, delta=1e-4 * expected)
 
     def test_slam_run(self):
-        self.open("slam", "run", "10_slam_scene/config.yaml", "--no-figures")
+        self.open("slam", "run", "10_slam_scene/config.yaml")
         self.expect_sound()
         for section in ("map", "state", "consistency", "measurements", "inside"):
             self.assertTrue(self.browser.find_elements(By.ID, section), section)
@@ -211,7 +211,7 @@ class PageTest(unittest.TestCase):
         lines = [line for line in config.splitlines() if not line.startswith("title:")]
         file = self.root / "hostile.yaml"
         file.write_text("\n".join(lines) + "\ntitle: " + json.dumps(HOSTILE) + "\n")
-        self.open("hostile", "run", file, "--no-figures")
+        self.open("hostile", "run", file)
         self.expect_sound()
         self.assertIsNone(self.script("return window.attacked || null"))
         self.assertEqual(self.script("return document.querySelector('h1').textContent"), HOSTILE)
@@ -221,7 +221,7 @@ class PageTest(unittest.TestCase):
         rows = "0,86\n0.1,87\n0.2,x7\n0.3,88\n"
         (self.root / "data.csv").write_text("t_s,disparity_px\n" + rows)
         (self.root / "broken.yaml").write_text(BROKEN)
-        self.open("broken", "run", self.root / "broken.yaml", "--no-figures")
+        self.open("broken", "run", self.root / "broken.yaml")
         self.assertEqual(self.browser.get_log("browser"), [])
         text = self.script("return document.getElementById('failure').innerText")
         self.assertIn("data.csv, line 4", text)

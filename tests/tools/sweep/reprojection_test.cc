@@ -5,7 +5,6 @@
 
 #include <limits>
 
-#include "alidade/sweep/value_labels.h"
 #include "support/recording.h"
 
 namespace alidade::internal {
@@ -38,26 +37,11 @@ TEST(Reprojection, IsTheMeanOverTheRunsThatCount) {
   const OutputFolder output(folder / "out", false);
   WriteReprojection(output, SweepOfTwoLevels());
   EXPECT_EQ(testing::Read(output.partial() / "reprojection.csv"),
-            "source.sigma_px,estimator,sensor,frame,runs,rms\n"
-            "0.5,ekf,pixels,1,2,1.5\n"
-            "0.5,ekf,pixels,2,0,\n"
-            "0.5,ekf,pixels,3,1,0.25\n"
-            "2,ekf,pixels,1,1,4\n");
-}
-
-TEST(Reprojection, HasACurveForEachValue) {
-  const testing::TemporaryFolder folder;
-  const OutputFolder output(folder / "out", false);
-  WriteReprojection(output, SweepOfTwoLevels());
-  DrawReprojection(output, SweepOfTwoLevels(), [] { return true; });
-  const std::string script = testing::Read(output.partial() / "figures/reprojection.gp");
-  for (const char* part :
-       {"title 'reprojection error of each frame, by source.sigma_px'", "set ylabel '[px]'",
-        "(column(0) >= 0 && column(0) < 3 ? column('rms') : NaN) with lines ls 1 title '0.5'",
-        "(column(0) >= 3 && column(0) < 4 ? column('rms') : NaN)", "with lines ls 2 title '2'",
-        "set xlabel 'frame'"}) {
-    EXPECT_NE(script.find(part), std::string::npos) << part << '\n' << script;
-  }
+            "source.sigma_px,estimator,sensor,unit,frame,runs,rms\n"
+            "0.5,ekf,pixels,px,1,2,1.5\n"
+            "0.5,ekf,pixels,px,2,0,\n"
+            "0.5,ekf,pixels,px,3,1,0.25\n"
+            "2,ekf,pixels,px,1,1,4\n");
 }
 
 TEST(Reprojection, IsNotWrittenWithoutASensorOfLandmarks) {
@@ -68,23 +52,7 @@ TEST(Reprojection, IsNotWrittenWithoutASensorOfLandmarks) {
     for (SweepRun& run : result.done) run.reprojection.clear();
   }
   WriteReprojection(output, sweep);
-  EXPECT_EQ(DrawReprojection(output, sweep, {}), "");
   EXPECT_FALSE(std::filesystem::exists(output.partial() / "reprojection.csv"));
-  EXPECT_FALSE(std::filesystem::exists(output.partial() / "figures/reprojection.gp"));
-}
-
-using Labels = std::vector<std::string>;
-
-TEST(ValueLabels, HaveOfLongValuesWhatDiffers) {
-  EXPECT_EQ(ValueLabels({"0.5", "{a: 1}", "[1, 2]"}), (Labels{"0.5", "{a: 1}", "[1, 2]"}));
-  EXPECT_EQ(ValueLabels({"{model: pinhole, width: 640, fx: 260, fy: 260, cx: 320}",
-                         "{model: pinhole, width: 640, fx: 525, fy: 525, cx: 320}"}),
-            (Labels{"fx: 260, fy: 260", "fx: 525, fy: 525"}));
-  EXPECT_EQ(
-      ValueLabels({"{a: {b: 1, c: 2}, and: a long map}", "{a: {b: 3, c: 2}, and: a long map}"}),
-      (Labels{"a: {b: 1, c: 2}", "a: {b: 3, c: 2}"}));
-  EXPECT_EQ(ValueLabels({"a word that is far too long", "another"}),
-            (Labels{"a word that is far to...", "another"}));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "alidade/base/number_text.h"
 #include "alidade/io/json.h"
 #include "alidade/io/output_folder.h"
+#include "alidade/report/page.h"
 
 namespace alidade {
 namespace {
@@ -99,18 +100,15 @@ BundleFolder::BundleFolder(const std::filesystem::path& folder, bool force)
     : output_(std::make_unique<OutputFolder>(folder, force)) {}
 BundleFolder::~BundleFolder() = default;
 
-std::vector<std::string> BundleFolder::Save(const BundleFile& file, const BundleResult& result,
-                                            double rms_before, double rms_after) {
-  std::vector<std::string> names = {"bundle.json", "points.csv", "poses.tum"};
-  output_->Write(names[0], ResultJson(file, result, rms_before, rms_after));
-  output_->Write(names[1], PointsCsv(file));
-  output_->Write(names[2], PosesTum(file));
+void BundleFolder::Save(const BundleFile& file, const BundleResult& result, double rms_before,
+                        double rms_after) {
+  output_->Write("bundle.json", ResultJson(file, result, rms_before, rms_after));
+  output_->Write("points.csv", PointsCsv(file));
+  output_->Write("poses.tum", PosesTum(file));
   if (file.format != BundleFormat::kTracks) {
-    names.push_back(std::string("problem") + ExtensionOf(file.format));
-    output_->Write(names.back(), BundleText(file));
+    output_->Write(std::string("problem") + ExtensionOf(file.format), BundleText(file));
   }
-  output_->Commit();
-  return names;
+  internal::CommitWithPage(*output_);
 }
 
 }  // namespace alidade

@@ -3,8 +3,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <string>
-#include <vector>
 
 #include "alidade/bundle/bundle_file.h"
 
@@ -22,6 +20,7 @@ class OutputFolder;
 ///                the number of the camera
 ///   points.csv   point,x,y,z
 ///   bundle.json  result of AdjustBundle(), and the counts of excluded items
+///   report.html  interactive page
 ///
 /// The folder appears after all files have been written. `force` replaces an existing folder. The
 /// constructor reserves the path, so a conflict is reported before the problem is solved.
@@ -31,9 +30,9 @@ class BundleFolder {
   BundleFolder(const std::filesystem::path& folder, bool force);
   ~BundleFolder();
 
-  /// Writes the files and returns their names. Call this function once. Errors: kCannotCreate, kIo.
-  std::vector<std::string> Save(const BundleFile& file, const BundleResult& result,
-                                double rms_before, double rms_after);
+  /// Writes the files. Call this function once. Errors: kCannotCreate, kIo.
+  void Save(const BundleFile& file, const BundleResult& result, double rms_before,
+            double rms_after);
 
  private:
   std::unique_ptr<internal::OutputFolder> output_;

@@ -188,15 +188,12 @@ ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost&
 /// of each value, and the statistics over all runs.
 Comparison Summarise(const std::vector<Comparison>& comparisons);
 
-/// Writes report.html of a comparison over several seeds, the figures of errors, average NEES and
-/// cost, and the csv files of these figures (docs/compare.md). Returns the reason why figures are
-/// missing, or "" if none is missing. The drawing ends when `stop` returns true. Errors:
+/// Writes over_time.csv and cost.csv of a comparison over several seeds (docs/compare.md). Errors:
 /// kCannotCreate, kIo.
-std::string WriteSeedReport(const internal::OutputFolder& folder, const Comparison& comparison,
-                            const Config& config, const std::function<bool()>& stop);
+void WriteSeedFiles(const internal::OutputFolder& folder, const Comparison& comparison);
 
 /// Format of a report.
-enum class TableStyle { kText, kMarkdown, kLatex, kHtml };
+enum class TableStyle { kText, kMarkdown, kLatex };
 /// Rows of the tables: all rows, or the main rows and the number of omitted rows. The main rows are
 /// errors, ratios of errors, NEES and the wall-clock time. Without truth, differences replace
 /// errors.

@@ -7,9 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "alidade/compare/finished_run.h"
 #include "alidade/compare/json_node.h"
-#include "alidade/compare/run_files.h"
 #include "alidade/io/number_rows.h"
+#include "alidade/io/run_files.h"
 
 namespace alidade {
 namespace {

@@ -12,9 +12,9 @@
 
 #include "alidade/base/text.h"
 #include "alidade/compare/json_node.h"
-#include "alidade/compare/run_files.h"
 #include "alidade/experiment/metric_key.h"
 #include "alidade/io/number_rows.h"
+#include "alidade/io/run_files.h"
 #include "alidade/io/text_cell.h"
 
 namespace alidade::internal {
@@ -235,6 +235,21 @@ std::int64_t Candidate::measurements() const {
 
 std::int64_t Candidate::used() const {
   return CountOf(result, {ToString(Outcome::kAccepted), ToString(Outcome::kInitialised)});
+}
+
+Json ReadRunJson(const fs::path& folder) {
+  if (fs::exists(folder / "sweep.json")) {
+    throw Error(ExitCode::kBadData,
+                ErrorLine(Place{folder.string()}, {}, "this is the folder of a sweep",
+                          "folders that `alidade run` has written"));
+  }
+  const fs::path file = folder / "run.json";
+  Json json = ReadJsonFile(file);
+  if (JsonNode(json, file.string()).At("status").Text() == "running") {
+    throw Error(ExitCode::kBadData,
+                ErrorLine(Place{folder.string()}, {}, "the run is not finished", "a finished run"));
+  }
+  return json;
 }
 
 ComparedRun ReadRun(const fs::path& folder) {

@@ -9,6 +9,7 @@
 #include "alidade/compare/cpu_clock.h"
 #include "alidade/compare/over_seeds.h"
 #include "alidade/experiment/run.h"
+#include "alidade/io/json.h"
 #include "alidade/record/estimate_series.h"
 
 /// Data of runs for a comparison. The data are from memory or from run folders.
@@ -46,6 +47,9 @@ struct ComparedRun {
   std::int64_t frames = 0;
   std::vector<Candidate> estimators;
 };
+
+/// Reads run.json. Refuses the folder of a sweep, and a run that is not finished.
+Json ReadRunJson(const std::filesystem::path& folder);
 
 /// Reads a run folder. Errors: kInputMissing if a file is missing, kBadData if a file is invalid or
 /// the files do not match.

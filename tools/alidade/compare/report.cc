@@ -7,7 +7,7 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/text.h"
-#include "alidade/compare/compare.h"
+#include "alidade/compare/conclusions.h"
 #include "alidade/compare/section.h"
 #include "alidade/experiment/metric_key.h"
 #include "alidade/experiment/metric_rows.h"
@@ -15,9 +15,12 @@
 #include "alidade/io/json.h"
 #include "alidade/io/output_folder.h"
 #include "alidade/io/text_table.h"
+#include "alidade/report/page.h"
 
 namespace alidade {
 
+using internal::kFewRuns;
+using internal::RatioText;
 using internal::RowsOf;
 using internal::Section;
 using internal::TableRow;
@@ -37,31 +40,6 @@ struct Column {
   std::map<std::string, std::string> units;
   std::map<std::string, Ratio> ratios = {};
 };
-
-/// Formats a number in the same way as the rows of metrics.
-std::string CellOf(double value) {
-  RunResult result;
-  result.estimators.resize(1);
-  result.estimators[0].metrics["value"] = value;
-  return RowsOf(result, "value", "")[0].cells[0];
-}
-
-/// Minimum number of runs for which the interval of a ratio is reliable. With fewer runs, the
-/// interval contains the ratio with less than the nominal probability. According to the t
-/// distribution, the 95 % interval would be 2.7 times as wide for three runs, and 1.2 times as wide
-/// for ten runs.
-constexpr std::int64_t kFewRuns = 10;
-
-/// Formats a ratio with the interval, as in `1.0110 [0.9930, 1.0302] undecided`.
-std::string RatioText(const Ratio& ratio) {
-  const auto text = [](double value) { return internal::FixedText(value, value < 10.0 ? 4 : 1); };
-  if (!ratio.interval || ratio.error == ratio.reference_error) return CellOf(ratio.value());
-  return text(ratio.value()) + " [" + text(ratio.interval->low) + ", " +
-         text(ratio.interval->high) + ']' +
-         (ratio.runs < kFewRuns ? " too few runs"
-          : ratio.undecided()   ? " undecided"
-                                : "");
-}
 
 /// Returns the rows with the ratios of a metric.
 std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKind& kind) {
@@ -400,6 +378,8 @@ std::vector<std::string> RatioLines(const Comparison& comparison) {
 
 std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
   std::vector<Section> sections;
+  const auto conclusions = internal::ConclusionLines(internal::ConclusionsOf(comparison));
+  if (!conclusions.empty()) sections.push_back({"Conclusions", {}, {}, conclusions});
   Section& head = sections.emplace_back();
   head.title = comparison.runs > 1
                    ? std::to_string(comparison.runs) + " runs, mean [5 % and 95 % quantiles]"
@@ -532,6 +512,7 @@ std::string CompareJson(const Comparison& comparison) {
   }
   if (!comparison.decomposition.empty()) json["decomposition"] = JsonOfDecomposition(comparison);
   json["notes"] = comparison.notes;
+  json["conclusions"] = internal::ConclusionsJson(internal::ConclusionsOf(comparison));
   return internal::JsonText(json);
 }
 
@@ -541,7 +522,7 @@ void WriteComparison(const Comparison& comparison, const std::filesystem::path& 
   out.Write("compare.json", CompareJson(comparison));
   out.Write("compare.md", CompareReport(comparison, TableStyle::kMarkdown));
   out.Write("compare.tex", CompareReport(comparison, TableStyle::kLatex));
-  out.Commit();
+  internal::CommitWithPage(out);
 }
 
 }  // namespace alidade

@@ -2,7 +2,6 @@
 #include "alidade/compare/section.h"
 
 #include "alidade/io/text_table.h"
-#include "alidade/record/report_html.h"
 
 namespace alidade::internal {
 namespace {
@@ -30,26 +29,6 @@ std::string Latex(const Section& section) {
   return text + '\n' + FormatTable(MakeTable(section.columns, section.rows), TableFormat::kLatex);
 }
 
-std::string Html(const Section& section) {
-  std::string text = "<h3>" + HtmlEscaped(section.title) + "</h3>\n";
-  for (const std::string& line : section.lines) {
-    text += "<p class=\"soft\">" + HtmlEscaped(line) + "</p>\n";
-  }
-  if (section.rows.empty()) return text;
-  const auto table_row = [](const char* tag, const std::vector<std::string>& cells) {
-    std::string line = "<tr>";
-    for (const std::string& cell : cells) {
-      line.append("<").append(tag).append(">") += HtmlEscaped(cell);
-      line.append("</").append(tag).append(">");
-    }
-    return line + "</tr>\n";
-  };
-  const Table table = MakeTable(section.columns, section.rows);
-  text += "<div class=\"scroll\"><table>\n" + table_row("th", table.header);
-  for (const TextRow& cells : table.rows) text += table_row("td", cells);
-  return text + "</table></div>\n";
-}
-
 }  // namespace
 
 std::string SectionsText(const std::vector<Section>& sections, TableStyle style) {
@@ -58,7 +37,6 @@ std::string SectionsText(const std::vector<Section>& sections, TableStyle style)
     if (!text.empty()) text += '\n';
     text += style == TableStyle::kMarkdown ? Markdown(section)
             : style == TableStyle::kLatex  ? Latex(section)
-            : style == TableStyle::kHtml   ? Html(section)
                                            : PlainText(section);
   }
   return text;

@@ -17,7 +17,7 @@ struct Section {
   std::vector<std::string> lines;
 };
 
-/// Formats sections as lines for a terminal, as Markdown, as LaTeX without packages, or as HTML.
+/// Formats sections as lines for a terminal, as Markdown, or as LaTeX without packages.
 std::string SectionsText(const std::vector<Section>& sections, TableStyle style);
 
 }  // namespace alidade::internal

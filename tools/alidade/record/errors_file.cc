@@ -14,11 +14,6 @@ ErrorsFile::ErrorsFile(const OutputFolder& folder, const std::string& estimator,
     blocks_.push_back(block);
     AddOwner(block);
     AppendColumns(kErrorColumns, block, columns);
-    int element = 0;
-    for (const std::string& name : TangentNames(block.name, block.space)) {
-      const bool is_angle = block.space.geometry.IsAngular(element);
-      elements_.push_back({name, block.unit, block.truth, element++, is_angle});
-    }
   }
   if (blocks_.empty()) return;
   for (const OwnerLayout& owner : owners_) AppendColumns(kOwnerColumns, owner, columns);
@@ -32,25 +27,9 @@ void ErrorsFile::AddOwner(const BlockLayout& block) {
   owner->blocks.push_back(block);
 }
 
-/// Records which elements have a known error, and which have a variance above zero.
-void ErrorsFile::Record(const BlockRow& row) {
-  std::size_t first = 0;
-  for (const BlockLayout& block : blocks_) {
-    const std::vector<double> error = row.ErrorOf(block), sigmas = row.SigmasOf(block);
-    for (std::size_t i = 0; i < block.tangent(); ++i) {
-      RecordedError& element = elements_[first + i];
-      element.is_known = element.is_known || (i < error.size() && std::isfinite(error[i]));
-      element.is_random =
-          element.is_random || (i < sigmas.size() && std::isfinite(sigmas[i]) && sigmas[i] > 0.0);
-    }
-    first += block.tangent();
-  }
-}
-
 void ErrorsFile::Add(const SourceFrame& frame, const State& state) {
   if (!file_) return;
   const BlockRow row{frame, state};
-  Record(row);
   file_->Time(frame.timestamp);
   for (const BlockLayout& block : blocks_) WriteCells(kErrorColumns, block, row, *file_);
   for (const OwnerLayout& owner : owners_) WriteCells(kOwnerColumns, owner, row, *file_);

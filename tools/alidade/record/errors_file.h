@@ -30,16 +30,12 @@ class ErrorsFile {
   void Add(const SourceFrame& frame, const State& state);
   /// Closes the file. Error: kIo.
   void Close();
-  const std::vector<RecordedError>& elements() const { return elements_; }
 
  private:
-  void Record(const BlockRow& row);
-
   void AddOwner(const BlockLayout& block);
 
   std::vector<BlockLayout> blocks_;  ///< blocks that have a truth
   std::vector<OwnerLayout> owners_;
-  std::vector<RecordedError> elements_;
   std::optional<CsvFile> file_;  ///< empty if no block has a truth
 };
 

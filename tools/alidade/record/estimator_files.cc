@@ -28,6 +28,15 @@ std::string UnitOfGain(const std::string& unit, const RecordedSensor& sensor) {
   return (unit.empty() ? "1" : InParentheses(unit)) + '/' + InParentheses(sensor.unit);
 }
 
+/// Returns the ambient size of the largest measurement.
+std::size_t WidestMeasurement(const Problem& problem) {
+  int width = 0;
+  for (const SensorBinding& binding : problem.sensors) {
+    width = std::max(width, binding.model->measurement().geometry.ambient);
+  }
+  return static_cast<std::size_t>(width);
+}
+
 }  // namespace
 
 RecordedEstimator EstimatorFiles::Describe(const EstimatorSpec& spec) {
@@ -42,47 +51,41 @@ RecordedEstimator EstimatorFiles::Describe(const EstimatorSpec& spec) {
     sensor.unit = space.unit;
     sensor.tangent = space.geometry.tangent;
     sensor.series = InnovationSeries(binding);
-    sensor.has_landmark = sensor.has_several = binding.model->has_landmark();
-    recorded.width = std::max(recorded.width, space.geometry.ambient);
+    sensor.has_reprojection = HasReprojection(binding);
   }
   return recorded;
 }
 
 EstimatorFiles::EstimatorFiles(const OutputFolder& folder, const EstimatorSpec& spec,
                                const TruthLayout& truth, bool covariances, RunColumns& run_columns)
-    : recorded_(Describe(spec)) {
-  AddBlocks(spec.problem, truth);
-  RecordPositionElements(spec.problem);
+    : recorded_(Describe(spec)),
+      blocks_(BlockLayoutsOf(spec.problem, truth.truths)),
+      width_(WidestMeasurement(spec.problem)) {
   OpenEstimates(folder, run_columns);
   const auto create = [&](const char* file, std::vector<Column> columns) {
     return CreateCsv(folder, spec.name + file, std::move(columns), run_columns);
   };
   std::vector<Column> columns;
-  AppendColumns(kInnovationColumns, {static_cast<std::size_t>(recorded_.width)}, columns);
+  AppendColumns(kInnovationColumns, {width_}, columns);
   innovations_ = create("/innovations.csv", std::exchange(columns, {}));
   gain_layout_ = AddGains(spec.problem);
   AppendColumns(kGainColumns, gain_layout_, columns);
   gains_ = create("/gains.csv", std::exchange(columns, {}));
-  if (std::ranges::any_of(spec.problem.sensors, HasReprojection)) {
+  if (std::ranges::any_of(recorded_.sensors, &RecordedSensor::has_reprojection)) {
     AppendColumns(kReprojectionColumns, NoLayout{}, columns);
     reprojection_ = create("/reprojection.csv", std::move(columns));
   }
-  last_measured_.assign(spec.problem.sensors.size(), kNoTimestamp);
   OpenTrajectory(folder, spec.problem);
   if (covariances) covariances_ = folder.Create(spec.name + "/covariance.bin");
 }
 
 void EstimatorFiles::OpenEstimates(const OutputFolder& folder, RunColumns& run_columns) {
   std::vector<Column> columns = {kTimeColumn};
-  std::vector<BlockLayout> blocks;
-  for (const RecordedBlock& block : blocks_) {
-    AppendColumns(kEstimateColumns, block.layout, columns);
-    blocks.push_back(block.layout);
-  }
+  for (const BlockLayout& block : blocks_) AppendColumns(kEstimateColumns, block, columns);
   estimates_ =
       CreateCsv(folder, recorded_.name + "/estimates.csv", std::move(columns), run_columns);
-  errors_.emplace(folder, recorded_.name, blocks, run_columns);
-  final_covariance_.emplace(blocks);
+  errors_.emplace(folder, recorded_.name, blocks_, run_columns);
+  final_covariance_.emplace(blocks_);
 }
 
 void EstimatorFiles::OpenTrajectory(const OutputFolder& folder, const Problem& problem) {
@@ -97,49 +100,22 @@ void EstimatorFiles::OpenTrajectory(const OutputFolder& folder, const Problem& p
                                  true);
 }
 
-void EstimatorFiles::RecordPositionElements(const Problem& problem) {
-  for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
-    recorded_.sensors[s].has_reprojection = HasReprojection(problem.sensors[s]);
-  }
-  const BlockId position = PositionBlockOf(problem);
-  for (const RecordedBlock& block : blocks_) {
-    if (block.layout.id == position) recorded_.path = static_cast<int>(block.element);
-  }
-}
-
-void EstimatorFiles::AddBlocks(const Problem& problem, const TruthLayout& truth) {
-  for (const BlockLayout& layout : BlockLayoutsOf(problem, truth.truths)) {
-    blocks_.push_back({layout, recorded_.elements.size(), recorded_.sigmas.size()});
-    for (const Column& column : TangentColumns(layout, "")) {
-      recorded_.sigmas.push_back({column.name, column.unit});
-    }
-    const std::vector<std::string> names = AmbientNames(layout.name, layout.space);
-    const bool has_sigma = names == TangentNames(layout.name, layout.space);
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      const bool has_truth = layout.truth >= 0;
-      recorded_.elements.push_back(
-          {names[i], layout.unit, has_sigma, has_truth ? truth.names[layout.truth][i] : ""});
-    }
-  }
-}
-
 GainLayout EstimatorFiles::AddGains(const Problem& problem) {
   GainLayout layout;
-  std::map<std::string, std::size_t>
-      cells;  // name of a gain -> column; gains with the same name share a column
+  // Name of a gain -> column. Gains with the same name share a column.
+  std::map<std::string, std::size_t> columns;
   for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
     const Space& space = problem.sensors[s].model->measurement();
     if (problem.sensors[s].model->has_landmark()) continue;
-    for (const RecordedBlock& block : blocks_) {
-      if (problem.layout[block.layout.id].status == BlockStatus::kConstant) continue;
-      for (std::size_t i = 0; i < block.layout.tangent(); ++i) {
-        const RecordedSigma& element = recorded_.sigmas[block.sigma + i];
+    for (const BlockLayout& block : blocks_) {
+      if (problem.layout[block.id].status == BlockStatus::kConstant) continue;
+      for (const Column& element : TangentColumns(block, "")) {
+        const std::string unit = UnitOfGain(element.unit, recorded_.sensors[s]);
         for (const std::string& measured : TangentNames(space.name, space)) {
           const std::string name = element.name + "<-" + measured;
-          const std::string unit = UnitOfGain(element.unit, recorded_.sensors[s]);
-          const auto [cell, is_new] = cells.try_emplace(name, cells.size());
-          if (is_new) layout.elements.push_back({name, unit, "", block.layout.name});
-          recorded_.sensors[s].gains.push_back({name, unit, cell->second});
+          const auto [column, is_new] = columns.try_emplace(name, columns.size());
+          if (is_new) layout.elements.push_back({name, unit, "", block.name});
+          recorded_.sensors[s].gain_columns.push_back(column->second);
         }
       }
     }
@@ -169,34 +145,10 @@ void EstimatorFiles::Add(const SourceFrame& frame, const State& state, const Upd
   }
 }
 
-/// Records which elements have a value, a true value or a positive variance.
-void EstimatorFiles::RecordEstimate(const SourceFrame& frame, const State& state) {
-  const BlockRow row{frame, state};
-  for (const RecordedBlock& recorded : blocks_) {
-    const BlockLayout& layout = recorded.layout;
-    const Block& block = state.layout()[layout.id];
-    if (!block.present) continue;
-    for (std::size_t i = 0; i < layout.ambient(); ++i) {
-      RecordedElement& element = recorded_.elements[recorded.element + i];
-      element.has_value = true;
-      element.varies = element.varies || block.status != BlockStatus::kConstant;
-      element.has_truth = element.has_truth || row.TruthOf(layout) != nullptr;
-    }
-    const std::vector<double> sigmas = row.SigmasOf(layout);
-    for (std::size_t i = 0; i < sigmas.size(); ++i) {
-      if (!(sigmas[i] > 0.0)) continue;
-      recorded_.sigmas[recorded.sigma + i].is_random = true;
-      RecordedElement& element = recorded_.elements[recorded.element + i];
-      if (element.has_sigma) element.is_random = true;
-    }
-  }
-}
-
 void EstimatorFiles::AddEstimate(const SourceFrame& frame, const State& state) {
-  RecordEstimate(frame, state);
   estimates_->Time(frame.timestamp);
-  for (const RecordedBlock& block : blocks_) {
-    WriteCells(kEstimateColumns, block.layout, {frame, state}, *estimates_);
+  for (const BlockLayout& block : blocks_) {
+    WriteCells(kEstimateColumns, block, {frame, state}, *estimates_);
   }
   estimates_->EndRow();
   final_covariance_->Set(state);
@@ -227,34 +179,25 @@ void EstimatorFiles::AddPose(Timestamp timestamp, const State& state) {
 }
 
 void EstimatorFiles::AddInnovation(Timestamp timestamp, const MeasurementReport& report) {
-  RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
-  const InnovationRow row{timestamp, sensor, report};
-  WriteCells(kInnovationColumns, {static_cast<std::size_t>(recorded_.width)}, row, *innovations_);
+  const RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
+  WriteCells(kInnovationColumns, {width_}, {timestamp, sensor, report}, *innovations_);
   innovations_->EndRow();
-  const bool has_innovation = row.is_predicted() && !report.innovation.empty();
-  sensor.has_innovations = sensor.has_innovations || has_innovation;
-  Timestamp& last = last_measured_[static_cast<std::size_t>(report.sensor)];
-  sensor.has_several = sensor.has_several || last == timestamp;
-  last = timestamp;
 }
 
 void EstimatorFiles::AddGain(Timestamp timestamp, const State& state,
                              const MeasurementReport& report) {
-  RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
+  const RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
   std::vector<const double*> cells(gain_layout_.elements.size(), nullptr);
   const std::size_t rows = report.gain.size() / static_cast<std::size_t>(sensor.tangent);
-  std::size_t next = 0;  // index into sensor.gains; order: block, element, measured element
+  std::size_t next = 0;  // index into sensor.gain_columns
   std::size_t row = 0;   // row of K
-  for (const RecordedBlock& recorded : blocks_) {
-    const Block& block = state.layout()[recorded.layout.id];
+  for (const BlockLayout& layout : blocks_) {
+    const Block& block = state.layout()[layout.id];
     if (block.status == BlockStatus::kConstant) continue;
-    for (std::size_t i = 0; i < recorded.layout.tangent(); ++i) {
-      for (int j = 0; j < sensor.tangent && next < sensor.gains.size(); ++j, ++next) {
+    for (std::size_t i = 0; i < layout.tangent(); ++i) {
+      for (int j = 0; j < sensor.tangent && next < sensor.gain_columns.size(); ++j, ++next) {
         if (!block.present) continue;
-        const double& k = report.gain[row + rows * static_cast<std::size_t>(j)];
-        RecordedGain& gain = sensor.gains[next];
-        cells[gain.cell] = &k;
-        gain.used = gain.used || k != 0.0;
+        cells[sensor.gain_columns[next]] = &report.gain[row + rows * static_cast<std::size_t>(j)];
       }
       row += block.present ? 1 : 0;
     }
@@ -269,17 +212,11 @@ void EstimatorFiles::Close(const OutputFolder& folder, RunColumns& run_columns) 
   innovations_->Close();
   gains_->Close();
   errors_->Close();
-  recorded_.errors = errors_->elements();
   if (trajectory_) trajectory_->Close();
   if (trajectory_covariance_) trajectory_covariance_->Close();
   if (covariances_) covariances_->Close();
-  if (reprojection_) {
-    reprojection_->Close();
-    recorded_.reprojection_rows = reprojection_->rows();
-  }
-  recorded_.estimate_rows = estimates_->rows();
-  recorded_.innovation_rows = innovations_->rows();
-  recorded_.gain_rows = gains_->rows();
+  if (reprojection_) reprojection_->Close();
+  recorded_.rows = estimates_->rows();
 }
 
 }  // namespace alidade::internal

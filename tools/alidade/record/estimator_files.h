@@ -40,29 +40,19 @@ class EstimatorFiles {
   const RecordedEstimator& recorded() const { return recorded_; }
 
  private:
-  struct RecordedBlock {
-    BlockLayout layout;
-    std::size_t element;  ///< index of the first element in recorded_.elements
-    std::size_t sigma;    ///< index of the first element in recorded_.sigmas
-  };
-
   static RecordedEstimator Describe(const EstimatorSpec& spec);
-  void AddBlocks(const Problem& problem, const TruthLayout& truth);
-  /// Records which sensors have reprojection errors, and which block is the camera position.
-  void RecordPositionElements(const Problem& problem);
   void OpenEstimates(const OutputFolder& folder, RunColumns& run_columns);
   GainLayout AddGains(const Problem& problem);
   void OpenTrajectory(const OutputFolder& folder, const Problem& problem);
-  void RecordEstimate(const SourceFrame& frame, const State& state);
   void AddEstimate(const SourceFrame& frame, const State& state);
   void AddPose(Timestamp timestamp, const State& state);
   void AddInnovation(Timestamp timestamp, const MeasurementReport& report);
   void AddGain(Timestamp timestamp, const State& state, const MeasurementReport& report);
 
   RecordedEstimator recorded_;
-  std::vector<RecordedBlock> blocks_;
+  std::vector<BlockLayout> blocks_;
+  std::size_t width_;  ///< number of columns of each of z, h, s and r
   GainLayout gain_layout_;
-  std::vector<Timestamp> last_measured_;  ///< timestamp of the last measurement of each sensor
   std::optional<CsvFile> estimates_, innovations_, gains_, reprojection_;
   std::optional<ErrorsFile> errors_;
   std::optional<PosePlace> pose_;  ///< indices of the blocks of the pose

@@ -8,17 +8,6 @@
 
 namespace alidade::internal {
 
-RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks) {
-  RecordedMap map;
-  for (const LandmarkEstimate& landmark : landmarks) {
-    if (!landmark.position.allFinite()) continue;
-    ++map.placed;
-    map.known += landmark.true_position.allFinite() ? 1 : 0;
-    map.removed += landmark.removed != kNoTimestamp ? 1 : 0;
-  }
-  return map;
-}
-
 std::vector<LandmarkEstimate> AllLandmarks(const EstimatorResult& result) {
   if (!result.landmarks) return {};
   std::vector<LandmarkEstimate> map = *result.landmarks;

@@ -7,12 +7,8 @@
 #include "alidade/experiment/run.h"
 #include "alidade/io/output_folder.h"
 #include "alidade/record/columns.h"
-#include "alidade/record/recorded_run.h"
 
 namespace alidade::internal {
-
-/// Counts the landmarks for a figure of the map.
-RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks);
 
 /// Returns all landmarks of an estimator, sorted by id and generation. A removed landmark has its
 /// last estimate. The result is empty if `result` has no map.

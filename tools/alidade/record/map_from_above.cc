@@ -10,7 +10,7 @@
 namespace alidade::internal {
 namespace {
 
-/// Takes in all values but the farthest: those from the 2 % quantile to the 98 % one.
+/// Widens the range, so that it contains the values between the 2 % and 98 % quantiles.
 void Widen(std::vector<double> values, double& low, double& high) {
   if (values.empty()) return;
   std::ranges::sort(values);
@@ -20,11 +20,11 @@ void Widen(std::vector<double> values, double& low, double& high) {
 
 }  // namespace
 
-void MapFromAbove::Begin(const Eigen::Vector3d& down) {
+void MapFromAbove::Begin(const Eigen::Vector3d& camera_y) {
   constexpr const char* kAxes[] = {"x", "y", "z"};
   constexpr double kFar = std::numeric_limits<double>::infinity();
   int axis = 0;
-  down.cwiseAbs().maxCoeff(&axis);
+  camera_y.cwiseAbs().maxCoeff(&axis);
   right_ = axis == 0 ? 1 : 0;
   up_ = axis == 2 ? 1 : 2;
   map_ = {kAxes[right_], kAxes[up_], {}, {}, {}, {}, {}, {kFar, -kFar, kFar, -kFar}};
@@ -39,19 +39,19 @@ void MapFromAbove::Add(const Eigen::Vector3d& position, const Eigen::Matrix3d& c
   map_->heading = Of(world_from_body.col(2).data());
   if (true_position != nullptr) map_->true_path.push_back(Of(true_position));
   map_->landmarks.clear();
-  for (const LandmarkEstimate& one : landmarks) {
-    if (!one.position.allFinite() || !one.covariance.allFinite()) continue;
-    map_->landmarks.push_back(Of(one.position, one.covariance));
+  for (const LandmarkEstimate& landmark : landmarks) {
+    if (!landmark.position.allFinite() || !landmark.covariance.allFinite()) continue;
+    map_->landmarks.push_back(Of(landmark.position, landmark.covariance));
   }
   WidenBounds();
 }
 
-/// They never shrink, so that what is shown does not jump from frame to frame.
+/// Widens the bounds. The bounds never shrink, so that the picture does not jump between frames.
 void MapFromAbove::WidenBounds() {
   std::vector<double> x, y;
-  for (const PlaneGaussian& one : map_->landmarks) {
-    x.push_back(one.x);
-    y.push_back(one.y);
+  for (const PlaneGaussian& landmark : map_->landmarks) {
+    x.push_back(landmark.x);
+    y.push_back(landmark.y);
   }
   auto& [left, right, bottom, top] = map_->bounds;
   Widen(std::move(x), left, right);

@@ -10,11 +10,11 @@
 
 namespace alidade::internal {
 
-/// The way of a camera and its landmarks, seen from above. What is up is the axis of the world that
-/// is nearest to the y axis of the first pose: a camera looks along z, y pointing down.
+/// Path of a camera and its landmarks, seen from above. The vertical axis of the world is the axis
+/// nearest to the y axis of the first pose: a camera looks along z, and y points down.
 class MapFromAbove {
  public:
-  /// A pose with the covariance of its position; `true_position` may be null.
+  /// Adds a pose with the covariance of its position. `true_position` may be null.
   void Add(const Eigen::Vector3d& position, const Eigen::Matrix3d& covariance,
            const Eigen::Matrix3d& world_from_body, const double* true_position,
            const std::vector<LandmarkEstimate>& landmarks);
@@ -25,7 +25,7 @@ class MapFromAbove {
   PlaneGaussian Of(const Eigen::Vector3d& mean, const Eigen::Matrix3d& p) const {
     return {mean[right_], mean[up_], p(right_, right_), p(right_, up_), p(up_, up_)};
   }
-  void Begin(const Eigen::Vector3d& down);
+  void Begin(const Eigen::Vector3d& camera_y);
   void WidenBounds();
 
   int right_ = 0, up_ = 1;  ///< axes of the world

@@ -5,58 +5,46 @@
 #include <array>
 #include <chrono>
 #include <ctime>
-#include <exception>
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "alidade/experiment/metric_rows.h"
 #include "alidade/io/json.h"
 #include "alidade/io/log.h"
 #include "alidade/io/output_folder.h"
-#include "alidade/io/read_file.h"
 #include "alidade/record/column_tables.h"
 #include "alidade/record/data_hash.h"
 #include "alidade/record/estimator_files.h"
-#include "alidade/record/figures.h"
 #include "alidade/record/landmarks_file.h"
 #include "alidade/record/landmarks_ply.h"
 #include "alidade/record/log_file.h"
-#include "alidade/record/report_html.h"
 #include "alidade/record/run_json.h"
 #include "alidade/record/source_files.h"
 #include "alidade/record/timing_file.h"
-#include "alidade/replay/replay.h"
 #include "alidade/replay/run_inputs.h"
+#include "alidade/report/page.h"
 
 namespace alidade {
 
 using Clock = std::chrono::steady_clock;
 
 struct Recorder::Impl {
-  Impl(const Options& recorder_options, const Config& run_config);
+  Impl(const Options& recorder_options, const Config& config);
 
-  internal::RecordedRun CloseFiles();
+  void CloseFiles();
   void WriteEvents(const EstimatorResult& result);
   std::string TimingJson(const RunResult& result) const;
-  void WriteReport(const RunResult& result);
-  /// Writes all files except run.json. Returns the error that occurred while the report was
-  /// written, or null if there was no error.
-  std::exception_ptr WriteResults(const RunResult& result);
+  /// Writes all files except run.json and the page.
+  void WriteResults(const RunResult& result);
 
   Options options;
   internal::OutputFolder folder;
   internal::LogFile log{folder};
-  const Config config;
-  std::string title, config_text;
   internal::RunFacts facts;
-  std::vector<std::string> subjects;  ///< result of SubjectsOf(experiment)
   internal::RunColumns run_columns;
   std::optional<internal::SourceFiles> source;
   std::optional<internal::DataHash> data;
   std::optional<internal::TimingFile> timing;
   std::vector<std::unique_ptr<internal::EstimatorFiles>> estimators;
-  std::vector<std::string> highlights;
-  std::string note;
   Clock::time_point started = Clock::now();
   std::time_t started_at = std::time(nullptr);
 };
@@ -70,47 +58,23 @@ constexpr const char* kColumnsFile = "columns.json";
 constexpr std::array<const char*, kFrameParts> kPartNames = {"step", "evaluate", "gate", "update",
                                                              "landmarks"};
 
-/// Returns the text of `key` in `map`. Returns `fallback` if the key does not exist.
-std::string TextOf(const Node& map, std::string_view key, const std::string& fallback) {
-  const std::optional<Node> node = map.is_map() ? map.Find(key) : std::nullopt;
-  return node && node->kind() == Node::Kind::kScalar ? node->Text() : fallback;
-}
-
-/// Returns the svg element in the text of an SVG file, without the XML prolog.
-std::string SvgElement(const std::string& svg) {
-  const std::size_t start = svg.find("<svg");
-  return start == svg.npos ? "" : svg.substr(start);
-}
-
 }  // namespace
 
-Recorder::Impl::Impl(const Options& recorder_options, const Config& run_config)
-    : options(recorder_options),
-      folder(options.folder, options.force),
-      config(run_config),
-      title(TextOf(config.root(), "title", std::filesystem::path(config.name()).stem().string())),
-      config_text(config.ToYaml()) {
+Recorder::Impl::Impl(const Options& recorder_options, const Config& config)
+    : options(recorder_options), folder(options.folder, options.force) {
   facts.plugins = options.plugins;
   folder.Write(kRunFile, internal::UnfinishedRunJson("running", ""));
-  folder.Write(internal::kResolvedConfig, config_text);
+  folder.Write(internal::kResolvedConfig, config.ToYaml());
   if (!options.inputs.empty()) folder.Write(internal::kInputsFile, options.inputs);
 }
 
-internal::RecordedRun Recorder::Impl::CloseFiles() {
-  internal::RecordedRun recorded;
-  if (source) {
-    source->Close();
-    source->Describe(recorded);
-  }
-  if (timing) {
-    timing->Close();
-    timing->Describe(recorded);
-  }
+void Recorder::Impl::CloseFiles() {
+  if (source) source->Close();
+  if (timing) timing->Close();
   for (const auto& estimator : estimators) {
     estimator->Close(folder, run_columns);
-    recorded.estimators.push_back(estimator->recorded());
+    facts.recorded.push_back(estimator->recorded());
   }
-  return recorded;
 }
 
 void Recorder::Impl::WriteEvents(const EstimatorResult& result) {
@@ -152,31 +116,6 @@ std::string Recorder::Impl::TimingJson(const RunResult& result) const {
   return internal::JsonText(json);
 }
 
-void Recorder::Impl::WriteReport(const RunResult& result) {
-  internal::Report report{title, config_text, facts, {}, {}, subjects};
-  if (options.figures) {
-    const auto limit = std::chrono::duration<double>(options.drawing_s);
-    const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(limit);
-    report.figures = internal::DrawFigures(folder, facts.recorded, {options.stop, end});
-  } else {
-    report.figures.note = "figures were not requested";
-  }
-  for (const internal::Figure& figure : report.figures.drawn) {
-    const std::string svg = "figures/" + figure.name + ".svg";
-    // The page only links a figure with wall-clock times, so that the page itself is reproducible.
-    report.svgs[figure.name] =
-        internal::HasWallClock(svg)
-            ? "<img src=\"" + svg + "\" alt=\"" + figure.title + "\">"
-            : SvgElement(internal::ReadFile(folder.partial() / svg, [](ExitCode, int) {}));
-  }
-  folder.Write("report.html", internal::ReportHtml(result, report));
-  highlights = {"report.html"};
-  if (report.figures.has_png) highlights.emplace_back("figures/measurements.png");
-  highlights.insert(highlights.end(), {"comparison.csv", "run.json"});
-  if (options.figures) note = report.figures.note;
-  if (!note.empty()) Log(LogLevel::kWarning, note);
-}
-
 Recorder::Recorder(const Options& options, const Config& config)
     : impl_(std::make_unique<Impl>(options, config)) {}
 
@@ -184,7 +123,6 @@ Recorder::~Recorder() = default;
 
 void Recorder::Begin(const Experiment& experiment) {
   impl_->facts.seed = experiment.seed;
-  impl_->subjects = internal::SubjectsOf(experiment);
   impl_->source.emplace(impl_->folder, experiment, impl_->run_columns);
   impl_->data.emplace(experiment.source->streams(), experiment.source->truths());
   impl_->timing.emplace(impl_->folder, experiment, impl_->run_columns);
@@ -220,18 +158,15 @@ void Recorder::AddFile(const std::string& name, std::string_view text) {
   impl_->folder.Write(name, text);
 }
 
-std::exception_ptr Recorder::Impl::WriteResults(const RunResult& result) {
+void Recorder::Impl::WriteResults(const RunResult& result) {
   const std::string timing_json = TimingJson(result);
-  internal::RecordedRun& recorded = facts.recorded = CloseFiles();
-  for (std::size_t e = 0; e < result.estimators.size(); ++e) {
-    const EstimatorResult& estimator = result.estimators[e];
+  CloseFiles();
+  for (const EstimatorResult& estimator : result.estimators) {
     WriteEvents(estimator);
     if (!estimator.landmarks) continue;
     const std::vector<LandmarkEstimate> map = internal::AllLandmarks(estimator);
     internal::WriteLandmarks(folder, estimator.name, map, run_columns);
     folder.Write(estimator.name + "/landmarks.ply", internal::LandmarksPly(map));
-    if (e >= recorded.estimators.size()) continue;
-    recorded.estimators[e].map = internal::DescribeMap(map);
   }
   if (data) {
     facts.measurements_sha256 = data->measurements();
@@ -240,20 +175,11 @@ std::exception_ptr Recorder::Impl::WriteResults(const RunResult& result) {
   folder.Write(kColumnsFile, internal::ColumnsJson(run_columns));
   folder.Write("comparison.csv", internal::ComparisonCsv(result));
   folder.Write("timing.json", timing_json);
-  try {
-    WriteReport(result);
-  } catch (const Error&) {
-    folder.Remove("report.html");
-    folder.Remove("figures");
-    return std::current_exception();
-  }
-  return nullptr;
 }
 
 void Recorder::Finish(const RunResult& result) {
-  std::exception_ptr without_report;
   try {
-    without_report = impl_->WriteResults(result);
+    impl_->WriteResults(result);
     impl_->log.Close();
     impl_->folder.Write(kRunFile, internal::RunJson(result, impl_->facts));
   } catch (...) {
@@ -264,13 +190,10 @@ void Recorder::Finish(const RunResult& result) {
     }
     throw;
   }
-  impl_->folder.Commit();
-  if (without_report) std::rethrow_exception(without_report);
+  internal::CommitWithPage(impl_->folder);
   if (IsLogged(LogLevel::kInfo)) Log(LogLevel::kInfo, "wrote " + impl_->options.folder.string());
 }
 
-const std::vector<std::string>& Recorder::highlights() const { return impl_->highlights; }
-const std::string& Recorder::note() const { return impl_->note; }
 const std::filesystem::path& Recorder::folder() const { return impl_->options.folder; }
 
 }  // namespace alidade

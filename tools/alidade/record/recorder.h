@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -22,13 +21,10 @@ class Recorder : public RunObserver {
  public:
   struct Options {
     std::filesystem::path folder;
-    bool force = false;               ///< true: replaces an existing folder
-    bool figures = true;              ///< true: draws figures, if gnuplot is installed
-    std::string command;              ///< command line of the program, for timing.json
-    std::function<bool()> stop = {};  ///< returns true to skip the remaining figures
-    double drawing_s = 60.0;          ///< time limit for all figures together, s
-    bool covariances = false;         ///< true: also writes `NAME/covariance.bin`
-    std::string inputs = {};          ///< text of inputs.json; "": the file is not written
+    bool force = false;        ///< true: replaces an existing folder
+    std::string command = {};  ///< command line of the program, for timing.json
+    bool covariances = false;  ///< true: also writes `NAME/covariance.bin`
+    std::string inputs = {};   ///< text of inputs.json; "": the file is not written
     /// Plugins that run.json lists: file name -> SHA-256.
     std::multimap<std::string, std::string> plugins = {};
   };
@@ -47,15 +43,11 @@ class Recorder : public RunObserver {
                   const UpdateReport& report) override;
   /// Adds a file to the folder. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, std::string_view text);
-  /// Completes the folder: closes the files with data of frames, writes all other files, run.json
-  /// last, and renames the folder. If a figure or the report cannot be written, completes the
-  /// folder without figures and report, and then throws the error.
+  /// Completes the folder: closes the files with data of frames, writes all other files, then
+  /// run.json and report.html, and renames the folder. If report.html cannot be written, completes
+  /// the folder without it, and then throws the error.
   void Finish(const RunResult& result);
 
-  /// Returns the paths of the most important files that Finish() wrote, relative to the folder.
-  const std::vector<std::string>& highlights() const;
-  /// Returns a note on omitted outputs ("gnuplot is not installed: no figures"), or "".
-  const std::string& note() const;
   const std::filesystem::path& folder() const;
 
  private:

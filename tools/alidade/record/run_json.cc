@@ -46,7 +46,7 @@ Json JsonOf(const EstimatorResult& result, const RecordedEstimator* recorded) {
                         {"geometry", block.geometry.name()},
                         {"size", block.geometry.ambient}});
     }
-    json["rows"] = recorded->estimate_rows;
+    json["rows"] = recorded->rows;
     Json& innovations = json["innovations"] = Json::object();
     for (const RecordedSensor& sensor : recorded->sensors) {
       innovations[sensor.name] = JsonOf(sensor.series);
@@ -109,9 +109,9 @@ std::string RunJson(const RunResult& result, const RunFacts& facts) {
   }
   Json& estimators = json["estimators"] = Json::object();
   for (const EstimatorResult& estimator : result.estimators) {
-    const auto& recorded = facts.recorded.estimators;
-    const auto found = std::ranges::find(recorded, estimator.name, &RecordedEstimator::name);
-    estimators[estimator.name] = JsonOf(estimator, found == recorded.end() ? nullptr : &*found);
+    const auto found = std::ranges::find(facts.recorded, estimator.name, &RecordedEstimator::name);
+    const bool is_recorded = found != facts.recorded.end();
+    estimators[estimator.name] = JsonOf(estimator, is_recorded ? &*found : nullptr);
   }
   return JsonText(json);
 }

@@ -16,7 +16,7 @@ namespace alidade::internal {
 struct RunFacts {
   std::uint64_t seed = 0;
   std::multimap<std::string, std::string> plugins;  ///< file name -> SHA-256
-  RecordedRun recorded;                             ///< contents of the csv files
+  std::vector<RecordedEstimator> recorded;          ///< files of each estimator
   std::string measurements_sha256, truth_sha256;    ///< hashes from DataHash; "": no data
 };
 

@@ -37,9 +37,7 @@ std::vector<std::vector<std::string>> TruthColumns(const Experiment& experiment)
 SourceFiles::SourceFiles(const OutputFolder& folder, const Experiment& experiment,
                          RunColumns& run_columns)
     : streams_(experiment.source->streams()),
-      truth_layout_{experiment.source->truths(), TruthColumns(experiment)},
-      stream_rows_(streams_.size(), 0),
-      expected_rows_(streams_.size(), 0) {
+      truth_layout_{experiment.source->truths(), TruthColumns(experiment)} {
   for (const StreamInfo& stream : streams_) {
     layout_.width = std::max(layout_.width, static_cast<std::size_t>(stream.size));
     layout_.known_width = std::max(layout_.known_width, static_cast<std::size_t>(stream.known));
@@ -60,18 +58,11 @@ SourceFiles::SourceFiles(const OutputFolder& folder, const Experiment& experimen
     expected_ = create("expected.csv", kExpectedColumns, ExpectedLayout{layout_.width});
   }
   if (inverses_.empty()) return;
-  std::vector<Column>& blocks = implied_layout_.blocks;
-  for (const Inverse& inverse : inverses_) {
-    const RecordedImplied& recorded = inverse.recorded;
-    if (recorded.cell != blocks.size()) continue;
-    blocks.push_back({recorded.block, recorded.unit, "", recorded.block});
-  }
   implied_ = create("implied_states.csv", kImpliedColumns, implied_layout_);
 }
 
 void SourceFiles::FindInverses(const Experiment& experiment) {
   std::set<std::string> sensors;
-  std::map<std::string, std::size_t> cells;
   for (const EstimatorSpec& spec : experiment.estimators) {
     const Problem& problem = spec.problem;
     for (const SensorBinding& binding : problem.sensors) {
@@ -86,22 +77,29 @@ void SourceFiles::FindInverses(const Experiment& experiment) {
       }
       std::optional<ImpliedState> state = ImpliedState::Of(problem, binding, truth_layout_.truths);
       if (!state) continue;
-      const Block& block = problem.layout[state->block()];
-      const std::size_t cell = cells.try_emplace(block.name, cells.size()).first->second;
-      RecordedImplied recorded{binding.name, block.name, UnitOf(problem, state->block()),
-                               state->uses_true_roles(), cell};
-      inverses_.push_back({s, *std::move(state), std::move(recorded)});
+      const std::size_t column = AddImpliedColumn(problem, state->block());
+      inverses_.push_back({s, *std::move(state), binding.name, column});
     }
   }
 }
 
+std::size_t SourceFiles::AddImpliedColumn(const Problem& problem, BlockId id) {
+  const std::string& name = problem.layout[id].name;
+  std::vector<Column>& columns = implied_layout_.blocks;
+  auto column = std::ranges::find(columns, name, &Column::name);
+  if (column == columns.end()) {
+    column = columns.insert(column, {name, UnitOf(problem, id), "", name});
+  }
+  return static_cast<std::size_t>(column - columns.begin());
+}
+
+const std::string& SourceFiles::StreamOf(const Measurement& measurement) const {
+  return streams_[static_cast<std::size_t>(measurement.stream)].name;
+}
+
 void SourceFiles::Add(const SourceFrame& frame) {
-  if (first_ == kNoTimestamp) first_ = frame.timestamp;
-  last_ = frame.timestamp;
   for (const Measurement& m : frame.measurements) {
-    const auto stream = static_cast<std::size_t>(m.stream);
-    ++stream_rows_[stream];
-    WriteCells(kMeasurementColumns, layout_, {m, streams_[stream].name}, *measurements_);
+    WriteCells(kMeasurementColumns, layout_, {m, StreamOf(m)}, *measurements_);
     measurements_->EndRow();
     AddExpected(frame, m);
     AddImplied(frame, m);
@@ -121,11 +119,9 @@ void SourceFiles::AddExpected(const SourceFrame& frame, const Measurement& m) {
   if (roles.empty() || model->Predict(roles.data(), z.data(), m.known.data()) != Status::kOk) {
     return;
   }
-  const auto stream = static_cast<std::size_t>(m.stream);
-  WriteCells(kExpectedColumns, ExpectedLayout{layout_.width},
-             {m.timestamp, streams_[stream].name, z}, *expected_);
+  WriteCells(kExpectedColumns, ExpectedLayout{layout_.width}, {m.timestamp, StreamOf(m), z},
+             *expected_);
   expected_->EndRow();
-  ++expected_rows_[stream];
 }
 
 void SourceFiles::AddImplied(const SourceFrame& frame, const Measurement& m) {
@@ -134,9 +130,8 @@ void SourceFiles::AddImplied(const SourceFrame& frame, const Measurement& m) {
     const std::optional<double> value = inverse.state.From(frame.truth, m.values.data());
     if (!value) continue;
     WriteCells(kImpliedColumns, implied_layout_,
-               {m.timestamp, inverse.recorded.sensor, inverse.recorded.cell, *value}, *implied_);
+               {m.timestamp, inverse.sensor, inverse.column, *value}, *implied_);
     implied_->EndRow();
-    ++inverse.recorded.rows;
   }
 }
 
@@ -146,21 +141,6 @@ void SourceFiles::Close() {
   if (poses_) poses_->Close();
   if (expected_) expected_->Close();
   if (implied_) implied_->Close();
-}
-
-void SourceFiles::Describe(RecordedRun& run) const {
-  for (std::size_t s = 0; s < streams_.size(); ++s) {
-    run.streams.push_back({streams_[s].name, streams_[s].size, stream_rows_[s], expected_rows_[s]});
-  }
-  for (const Inverse& inverse : inverses_) run.implied.push_back(inverse.recorded);
-  if (first_ != kNoTimestamp) {
-    run.first = first_;
-    run.last = last_;
-  }
-  run.measurement_rows = measurements_->rows();
-  if (truth_) run.truth_rows = truth_->rows();
-  if (expected_) run.expected_rows = expected_->rows();
-  if (implied_) run.implied_rows = implied_->rows();
 }
 
 }  // namespace alidade::internal

@@ -10,7 +10,6 @@
 #include "alidade/io/csv_file.h"
 #include "alidade/record/column_tables.h"
 #include "alidade/record/pose_file.h"
-#include "alidade/record/recorded_run.h"
 
 namespace alidade::internal {
 
@@ -29,14 +28,13 @@ class SourceFiles {
   void Add(const SourceFrame& frame);
   void Close();
   const TruthLayout& truth_layout() const { return truth_layout_; }
-  /// Sets the fields of `run` that describe the data of the source.
-  void Describe(RecordedRun& run) const;
 
  private:
   struct Inverse {
     int stream;
     ImpliedState state;
-    RecordedImplied recorded;
+    std::string sensor;
+    std::size_t column;  ///< index into implied_layout_.blocks
   };
   /// Model of a sensor whose roles all have a truth; the first such sensor of its stream. `truths`
   /// contains the index of the truth of each role.
@@ -46,18 +44,19 @@ class SourceFiles {
   };
 
   void FindInverses(const Experiment& experiment);
+  /// Returns the column of a block in implied_states.csv. Adds the column if it does not exist.
+  std::size_t AddImpliedColumn(const Problem& problem, BlockId id);
+  /// Returns the name of the stream of a measurement.
+  const std::string& StreamOf(const Measurement& measurement) const;
   void AddExpected(const SourceFrame& frame, const Measurement& measurement);
   void AddImplied(const SourceFrame& frame, const Measurement& measurement);
 
   std::vector<StreamInfo> streams_;
   TruthLayout truth_layout_;
-  std::vector<std::int64_t> stream_rows_;    ///< rows of each stream in measurements.csv
-  std::vector<std::int64_t> expected_rows_;  ///< rows of each stream in expected.csv
   std::map<int, Expectation> expectations_;  ///< key: index of the stream
   std::vector<Inverse> inverses_;
   MeasurementLayout layout_{1, 0};
   ImpliedLayout implied_layout_;
-  Timestamp first_ = kNoTimestamp, last_ = kNoTimestamp;
   std::optional<CsvFile> measurements_, truth_, expected_, implied_;
   std::optional<PoseFile> poses_;
 };

@@ -7,8 +7,6 @@
 #include "alidade/experiment/run.h"
 #include "alidade/io/csv_file.h"
 #include "alidade/record/column_tables.h"
-#include "alidade/record/figure_script.h"
-#include "alidade/record/recorded_run.h"
 
 namespace alidade::internal {
 
@@ -22,22 +20,15 @@ class TimingFile {
   void Add(const SourceFrame& frame);
   void AddTime(int estimator, double wall_s);
   void Close();
-  void Describe(RecordedRun& run) const;
 
  private:
   void EndRow();
 
-  std::vector<RecordedTimes> times_;
   std::vector<int> column_of_;              ///< column of each estimator; -1: offline
   std::vector<std::optional<double>> row_;  ///< time in each column
   Timestamp timestamp_ = kNoTimestamp;      ///< timestamp of the current row
   TimingLayout layout_;
   std::optional<CsvFile> file_;
 };
-
-/// Returns figure `timing`: the wall-clock time of each frame over time, and the frame period. The
-/// key of each curve reports the ratio of wall-clock time to frame period. The figure is empty if
-/// no time is known.
-FigureScript TimingFigure(const RecordedRun& run);
 
 }  // namespace alidade::internal

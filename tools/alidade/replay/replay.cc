@@ -53,7 +53,7 @@ RecordedInputs ReadReplayable(const fs::path& folder) {
   const std::vector<std::string>& arguments = inputs.command.arguments;
   if (arguments.empty() || (arguments[0] != "run" && arguments[0] != "sweep")) {
     throw Error(ExitCode::kBadData,
-                ErrorLine(Place{file.string()}, "arguments", "the command does not create a folder",
+                ErrorLine(Place{file.string()}, "arguments", "the command cannot be repeated",
                           "the command run or sweep"));
   }
   if (!inputs.read_once.empty()) {
@@ -74,8 +74,7 @@ RecordedInputs ReadReplayable(const fs::path& folder) {
 }
 
 bool HasWallClock(std::string_view file) {
-  constexpr std::array<std::string_view, 3> kFiles = {"timing.json", "timing.csv",
-                                                      "figures/timing.svg"};
+  constexpr std::array<std::string_view, 2> kFiles = {"timing.json", "timing.csv"};
   return std::ranges::find(kFiles, file) != kFiles.end();
 }
 

@@ -66,7 +66,8 @@ Json OverTime(const CsvColumns& table, ColumnPool& pool) {
 Json ComparisonData(const std::filesystem::path& folder, const Json& comparison, ColumnPool& pool) {
   Json data = {{"runs", comparison.at("runs")},
                {"reference", comparison.at("reference")},
-               {"notes", comparison.value("notes", Json::array())}};
+               {"notes", comparison.value("notes", Json::array())},
+               {"conclusions", comparison.value("conclusions", Json::array())}};
   Json& estimators = data["estimators"] = Json::array();
   for (const auto& [name, entry] : comparison.at("estimators").items()) {
     estimators.push_back(EstimatorOf(name, entry));

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "alidade/compare/run_files.h"
 #include "alidade/io/read_file.h"
+#include "alidade/io/run_files.h"
 #include "alidade/io/text_cell.h"
 
 namespace alidade::internal {

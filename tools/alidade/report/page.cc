@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/report/page.h"
 
+#include <exception>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <sstream>
-#include <tuple>
+#include <set>
 
 #include "alidade/base/text.h"
-#include "alidade/compare/run_files.h"
 #include "alidade/config/config.h"
+#include "alidade/io/output_folder.h"
 #include "alidade/io/read_file.h"
+#include "alidade/io/run_files.h"
+#include "alidade/report/bundle_data.h"
 #include "alidade/report/comparison_data.h"
 #include "alidade/report/embedded.h"
 #include "alidade/report/quotation.h"
@@ -33,47 +35,42 @@ std::string TextIfExists(const fs::path& file) {
       file, [&](ExitCode, int) { internal::FailFile(file, 0, "the file cannot be read"); });
 }
 
-/// Files of a finished folder that describe the whole folder. A missing JSON file is null.
+/// Files that describe a whole folder. A missing JSON file is null.
 struct Folder {
   explicit Folder(const fs::path& folder)
       : path(folder),
-        name(fs::weakly_canonical(folder).filename().string()),
         run(JsonIfExists(folder / "run.json")),
         comparison(JsonIfExists(folder / "compare.json")),
         sweep(JsonIfExists(folder / "sweep.json")),
+        bundle(JsonIfExists(folder / "bundle.json")),
         inputs(JsonIfExists(folder / "inputs.json")),
         config(TextIfExists(folder / "config.resolved.yaml")),
         config_tree(Config::FromText(config.empty() ? "{}" : config, "config.resolved.yaml")) {}
 
   /// Returns the JSON file with the status of the folder.
   const Json& main() const {
-    return !run.is_null() ? run : !comparison.is_null() ? comparison : sweep;
+    for (const Json* const file : {&run, &comparison, &sweep}) {
+      if (!file->is_null()) return *file;
+    }
+    return bundle;
   }
 
   fs::path path;
-  std::string name;
-  Json run, comparison, sweep, inputs;
+  Json run, comparison, sweep, bundle, inputs;
   std::string config;
   Config config_tree;
 };
 
-/// Returns the name of the config, which the page shows in commands.
+/// Returns the name of the config, which the page shows in commands; "" if it is not recorded.
 std::string ConfigName(const Folder& folder) {
-  if (folder.inputs.contains("config")) return folder.inputs.at("config").value("file", "CONFIG");
-  return "CONFIG";
+  return folder.inputs.contains("config") ? folder.inputs.at("config").value("file", "") : "";
 }
 
-/// Returns the command that repeats the folder, without -o.
+/// Returns the command that repeats the folder, without -o; "" if it is not recorded.
 std::string CommandOf(const Folder& folder) {
-  std::vector<std::string> arguments;
-  if (folder.inputs.contains("arguments")) {
-    arguments = folder.inputs.at("arguments").get<std::vector<std::string>>();
-  } else if (!folder.comparison.is_null()) {
-    arguments = {"compare"};
-    const int runs = folder.comparison.value("runs", 1);
-    if (runs > 1) arguments.insert(arguments.end(), {"--runs", std::to_string(runs)});
-  }
-  if (arguments.empty()) arguments = {"run"};
+  if (!folder.inputs.contains("arguments")) return "";
+  auto arguments = folder.inputs.at("arguments").get<std::vector<std::string>>();
+  if (arguments.empty()) return "";
   arguments.insert(arguments.begin() + 1, ConfigName(folder));
   return "alidade " + internal::Join(arguments, " ");
 }
@@ -93,60 +90,72 @@ Json FailureOf(const std::string& reason) {
           {"lines", lines}};
 }
 
+/// Returns the title of the config, or else the name of the config without its extension. The name
+/// of the folder is not used, because a repeated run has the same page in another folder.
 std::string TitleOf(const Folder& folder) {
   const Node root = folder.config_tree.root();
   const auto title = root.is_map() ? root.Find("title") : std::nullopt;
-  return title ? title->Text() : folder.name;
+  if (title) return title->Text();
+  if (const std::string name = ConfigName(folder); !name.empty()) return fs::path(name).stem();
+  return !folder.run.is_null()          ? "Run"
+         : !folder.comparison.is_null() ? "Comparison"
+         : !folder.sweep.is_null()      ? "Sweep"
+                                        : "Bundle adjustment";
 }
 
-Json LinesOf(const std::string& text) {
-  Json lines = Json::array();
-  std::istringstream stream(text);
-  for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  return lines;
+/// Returns the names of all files except the page and the list of files, sorted.
+Json FilesOf(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) names.insert(fs::relative(entry.path(), folder).string());
+  }
+  for (const char* const name : {"report.html", "files.txt"}) names.erase(name);
+  return names;
 }
 
 /// Returns the facts about the folder.
 Json FactsOf(const Folder& folder) {
   const Json& main = folder.main();
-  const std::string reason = main.value("reason", "");
-  Json facts = {{"format", "alidade-report"},
-                {"version", 1},
-                {"name", folder.name},
-                {"title", TitleOf(folder)},
-                {"status", main.value("status", "ok")},
+  const std::string status = main.value("status", "ok");
+  const std::string reason = main.value("reason", main.value("message", ""));
+  Json facts = {{"title", TitleOf(folder)},
+                {"status", status == "converged" ? "ok" : status},
                 {"reason", reason},
                 {"failure", FailureOf(reason)},
                 {"command", CommandOf(folder)},
                 {"config_file", ConfigName(folder)}};
   constexpr std::size_t kHashDigits = 12;
-  std::string hash, version;
+  std::string hash;
   if (folder.run.contains("data")) hash = folder.run.at("data").value("measurements", "");
-  if (folder.run.contains("versions")) version = folder.run.at("versions").value("alidade", "");
-  facts["program"] = version;
   facts["verdict"] = main.value("verdict", Json());
   facts["seed"] = main.value("seed", Json());
   facts["frames"] = main.value("frames", Json());
   facts["reference"] = main.value("reference", "");
   facts["hash"] = hash.substr(0, kHashDigits);
   facts["config"] = folder.config;
-  facts["files"] = LinesOf(TextIfExists(folder.path / "files.txt"));
+  facts["files"] = FilesOf(folder.path);
   return facts;
 }
 
-/// Returns the data of the page as JSON. Error: kBadData if a JSON file has an unexpected content.
-std::string DataText(const Folder& folder) try {
-  internal::ColumnPool pool;
+/// Returns the facts about the folder, and its results. Error: kBadData if a JSON file has an
+/// unexpected content.
+Json DataOf(const Folder& folder, internal::ColumnPool& pool) try {
   Json data = FactsOf(folder);
-  const auto& [run, comparison, sweep] = std::tie(folder.run, folder.comparison, folder.sweep);
   const Node config = folder.config_tree.root();
-  data["run"] = run.is_null() ? Json() : internal::RunData(folder.path, run, config, pool);
-  data["compare"] =
-      comparison.is_null() ? Json() : internal::ComparisonData(folder.path, comparison, pool);
-  data["sweep"] = sweep.is_null() ? Json() : internal::SweepData(folder.path, sweep, pool);
-  std::string text = data.dump(-1, ' ', false, Json::error_handler_t::replace);
-  text.back() = ',';  // the columns follow
-  return text + "\"columns\":" + pool.Text() + '}';
+  if (!folder.run.is_null()) {
+    data["run"] = internal::RunData(folder.path, folder.run, config, pool);
+  }
+  if (!folder.comparison.is_null()) {
+    data["compare"] = internal::ComparisonData(folder.path, folder.comparison, pool);
+  }
+  if (!folder.sweep.is_null()) {
+    data["sweep"] = internal::SweepData(folder.path, folder.sweep, pool);
+  }
+  if (!folder.bundle.is_null()) {
+    data["bundle"] = folder.bundle;
+    data["run"] = internal::BundleScene(folder.path, pool);
+  }
+  return data;
 } catch (const Json::exception& error) {
   internal::FailFile(folder.path, 0, std::string("a JSON file is invalid (") + error.what() + ')');
 }
@@ -185,16 +194,65 @@ std::string Filled(std::string_view page,
 std::string ReportPage(const fs::path& path) {
   const Folder folder(path);
   if (folder.main().is_null()) {
-    throw Error(ExitCode::kInputMissing,
-                ErrorLine(Place{path.string()}, {},
-                          "the folder has none of run.json, compare.json and sweep.json",
-                          "a folder that `alidade run`, `compare` or `sweep` has written"));
+    throw Error(
+        ExitCode::kInputMissing,
+        ErrorLine(Place{path.string()}, {},
+                  "the folder has none of run.json, compare.json, sweep.json and bundle.json",
+                  "a folder that `alidade run`, `compare`, `sweep` or `bundle` has written"));
   }
-  const std::string title = Replaced(Replaced(TitleOf(folder), "&", "&amp;"), "<", "&lt;");
-  return Filled(internal::kPageTemplate, {{"title", title},
-                                          {"style", internal::kPageStyle},
-                                          {"script", internal::kPageScript},
-                                          {"data", ScriptEscaped(DataText(folder))}});
+  internal::ColumnPool pool;
+  return internal::PageText(DataOf(folder, pool), pool);
 }
 
+namespace internal {
+
+std::string PageText(const Json& data, const ColumnPool& pool) {
+  Json whole = {{"format", "alidade-report"},
+                {"version", 1},
+                {"status", "ok"},
+                {"reason", ""},
+                {"failure", {}},
+                {"command", ""},
+                {"config_file", ""},
+                {"program", ALIDADE_VERSION},
+                {"verdict", {}},
+                {"seed", {}},
+                {"frames", {}},
+                {"reference", ""},
+                {"hash", ""},
+                {"config", ""},
+                {"files", Json::array()},
+                {"run", {}},
+                {"compare", {}},
+                {"sweep", {}},
+                {"evaluation", {}},
+                {"bundle", {}}};
+  whole.update(data);
+  std::string text = whole.dump(-1, ' ', false, Json::error_handler_t::replace);
+  text.back() = ',';  // the columns follow
+  text += "\"columns\":" + pool.Text() + '}';
+  const auto title = data.at("title").get<std::string>();
+  return Filled(kPageTemplate, {{"title", Replaced(Replaced(title, "&", "&amp;"), "<", "&lt;")},
+                                {"style", kPageStyle},
+                                {"script", kPageScript},
+                                {"data", ScriptEscaped(text)}});
+}
+
+void WritePage(const OutputFolder& folder) {
+  folder.Write("report.html", ReportPage(folder.partial()));
+}
+
+void CommitWithPage(OutputFolder& folder) {
+  std::exception_ptr error;
+  try {
+    WritePage(folder);
+  } catch (const Error&) {
+    error = std::current_exception();
+    folder.Remove("report.html");
+  }
+  folder.Commit();
+  if (error) std::rethrow_exception(error);
+}
+
+}  // namespace internal
 }  // namespace alidade

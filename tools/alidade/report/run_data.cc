@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "alidade/compare/run_files.h"
 #include "alidade/estimation/estimator.h"
+#include "alidade/io/run_files.h"
 #include "alidade/report/estimator_data.h"
 #include "alidade/report/run_tables.h"
 

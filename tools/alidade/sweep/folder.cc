@@ -13,6 +13,8 @@
 #include "alidade/io/json.h"
 #include "alidade/io/output_folder.h"
 #include "alidade/replay/run_inputs.h"
+#include "alidade/report/page.h"
+#include "alidade/sweep/conclusions.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/reprojection.h"
 #include "alidade/sweep/run_record.h"
@@ -22,6 +24,8 @@
 
 namespace alidade {
 
+using internal::ConclusionsJson;
+using internal::ConclusionsOf;
 using internal::CountFinished;
 using internal::CountWithheld;
 using internal::CsvFile;
@@ -83,6 +87,7 @@ std::string SweepJson(const SweepResult& result, const std::vector<SweepSummary>
                              {"first_seed", result.first_seed},
                              {"reference", result.reference},
                              {"withheld", CountWithheld(result)},
+                             {"conclusions", ConclusionsJson(ConclusionsOf(result, summaries))},
                              {"estimators", EstimatorsOf(summaries)}});
 }
 
@@ -102,6 +107,7 @@ std::string SweepJson(const VariedSweep& sweep) {
        {"vary", sweep.variation.key},
        {"scope", sweep.variation.scope == Variation::Scope::kConfig ? "config" : "estimators"},
        {"warning", sweep.warning},
+       {"conclusions", ConclusionsJson(ConclusionsOf(sweep))},
        {"values", std::move(values)}});
 }
 
@@ -293,7 +299,7 @@ void SweepFolder::AddFile(const std::string& name, const std::string& text) {
 void SweepFolder::Impl::Complete(const Parts& parts, bool stopped, const Config& config) {
   if (finished) {
     finished->Close();
-    if (stopped) return;
+    if (stopped) return internal::WritePage(folder);
     if (shard) {
       WriteShardRuns(folder, parts);
     } else {
@@ -302,7 +308,7 @@ void SweepFolder::Impl::Complete(const Parts& parts, bool stopped, const Config&
   } else {
     folder.Write(internal::kResolvedConfig, config.ToYaml());
   }
-  folder.Commit();
+  internal::CommitWithPage(folder);
 }
 
 void SweepFolder::Write(const SweepResult& result, const std::vector<SweepSummary>& summaries,
@@ -317,8 +323,7 @@ void SweepFolder::Write(const SweepResult& result, const std::vector<SweepSummar
   impl_->Complete(parts, result.stopped, config);
 }
 
-std::string SweepFolder::Write(const VariedSweep& sweep, const Config& config,
-                               const std::function<bool()>& stop) {
+void SweepFolder::Write(const VariedSweep& sweep, const Config& config) {
   impl_->folder.Retain();
   const OutputFolder& folder = impl_->folder;
   const Parts parts = PartsOf(sweep);
@@ -328,10 +333,7 @@ std::string SweepFolder::Write(const VariedSweep& sweep, const Config& config,
   WriteFailures(folder, parts, sweep.variation.key);
   folder.Write("table.md", internal::VariedMarkdown(sweep));
   internal::WriteReprojection(folder, sweep);
-  std::string note = internal::DrawVariation(folder, sweep, stop);
-  if (note.empty()) note = internal::DrawReprojection(folder, sweep, stop);
   impl_->Complete(parts, sweep.stopped(), config);
-  return note;
 }
 
 }  // namespace alidade

@@ -2,14 +2,10 @@
 #include "alidade/sweep/reprojection.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "alidade/experiment/frame_innovation.h"
 #include "alidade/io/csv_file.h"
-#include "alidade/record/figure_script.h"
-#include "alidade/record/figures.h"
-#include "alidade/sweep/value_labels.h"
 
 namespace alidade::internal {
 namespace {
@@ -60,65 +56,6 @@ std::vector<MeanErrors> MeansOf(const SweepResult& result) {
   return means;
 }
 
-/// Returns the mean errors of each estimator and sensor for each value, in the order of
-/// `reprojection.csv`.
-std::vector<std::vector<MeanErrors>> MeansOf(const VariedSweep& sweep) {
-  std::vector<std::vector<MeanErrors>> means;
-  for (const SweepResult& result : sweep.results) means.push_back(MeansOf(result));
-  return means;
-}
-
-/// Returns the gnuplot condition that selects `count` rows from row `first`.
-std::string Rows(std::size_t first, std::size_t count) {
-  return "column(0) >= " + std::to_string(first) + " && column(0) < " +
-         std::to_string(first + count);
-}
-
-/// Adds the panel of one estimator and sensor, with one curve for each value.
-void AddPanel(FigureScript& script, const std::vector<std::vector<MeanErrors>>& means,
-              const FrameErrors& panel, const std::vector<std::string>& labels) {
-  script.Panel(panel.estimator + ", " + panel.sensor + ": rms of z - h, mean over the runs",
-               InBrackets(panel.unit));
-  script.Set("set logscale y 2\nset format y '%g'\nset xrange [1:*]");
-  std::size_t row = 0;
-  for (std::size_t v = 0; v < means.size(); ++v) {
-    for (const MeanErrors& errors : means[v]) {
-      const std::size_t first = row;
-      row += errors.runs.size();
-      if (!HaveSameSensor(errors.mean, panel) || v >= kMaxCurves) continue;
-      script.Curve({"reprojection.csv", 0},
-                   "(column('frame')):(" + Rows(first, errors.runs.size()) +
-                       " ? column('rms') : NaN) with lines ls " + std::to_string(v + 1),
-                   labels[v]);
-    }
-  }
-}
-
-FigureScript ReprojectionFigure(const VariedSweep& sweep) {
-  const std::vector<std::string>& values = sweep.variation.values;
-  const std::string selection = values.size() <= kMaxCurves
-                                    ? ""
-                                    : ": the first " + std::to_string(kMaxCurves) + " of " +
-                                          std::to_string(values.size()) + " values";
-  FigureScript script("reprojection",
-                      "reprojection error of each frame, by " + sweep.variation.key + selection,
-                      "frame");
-  const std::vector<std::vector<MeanErrors>> means = MeansOf(sweep);
-  const std::vector<std::string> labels = ValueLabels(values);
-  std::vector<FrameErrors> panels;
-  for (const std::vector<MeanErrors>& value_means : means) {
-    for (const MeanErrors& errors : value_means) {
-      const auto is_same = [&](const FrameErrors& panel) {
-        return HaveSameSensor(panel, errors.mean);
-      };
-      if (panels.size() == kMaxPanels || std::ranges::any_of(panels, is_same)) continue;
-      panels.push_back(errors.mean);
-      AddPanel(script, means, errors.mean, labels);
-    }
-  }
-  return script;
-}
-
 }  // namespace
 
 void ReprojectionRecorder::Begin(const Experiment& experiment) {
@@ -142,14 +79,16 @@ void ReprojectionRecorder::OnEstimate(int estimator, const SourceFrame& /*frame*
 }
 
 void WriteReprojection(const OutputFolder& folder, const VariedSweep& sweep) {
-  const std::vector<std::vector<MeanErrors>> means = MeansOf(sweep);
+  std::vector<std::vector<MeanErrors>> means;  // for each value
+  for (const SweepResult& result : sweep.results) means.push_back(MeansOf(result));
   if (std::ranges::all_of(means, &std::vector<MeanErrors>::empty)) return;
   CsvFile csv(folder, "reprojection.csv",
-              {sweep.variation.key, "estimator", "sensor", "frame", "runs", "rms"});
+              {sweep.variation.key, "estimator", "sensor", "unit", "frame", "runs", "rms"});
   for (std::size_t v = 0; v < means.size(); ++v) {
     for (const MeanErrors& errors : means[v]) {
       for (std::size_t k = 0; k < errors.runs.size(); ++k) {
         csv.Text(sweep.variation.values[v]).Text(errors.mean.estimator).Text(errors.mean.sensor);
+        csv.Text(errors.mean.unit);
         csv.Integer(static_cast<std::int64_t>(k) + 1).Integer(errors.runs[k]);
         errors.runs[k] > 0 ? csv.Number(errors.mean.rms[k]) : csv.Empty();
         csv.EndRow();
@@ -157,18 +96,6 @@ void WriteReprojection(const OutputFolder& folder, const VariedSweep& sweep) {
     }
   }
   csv.Close();
-}
-
-std::string DrawReprojection(const OutputFolder& folder, const VariedSweep& sweep,
-                             const std::function<bool()>& stop) {
-  const FigureScript script = ReprojectionFigure(sweep);
-  if (sweep.stopped() || script.empty()) return "";
-  folder.Write("figures/reprojection.gp", script.Text());
-  const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
-  const GnuplotResult result =
-      DrawFigure(folder, "reprojection.svg", {"figures/reprojection.gp"}, DrawingLimits{stop, end});
-  if (result.end == GnuplotResult::End::kFailed) return result.complaint;
-  return Obstacle(result.end);
 }
 
 }  // namespace alidade::internal

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -36,11 +35,5 @@ class ReprojectionRecorder : public RunObserver {
 /// mean over the used runs (SweepRun::UsesMetricsOf). If there are no errors, the file is not
 /// written. Errors: kCannotCreate, kIo.
 void WriteReprojection(const OutputFolder& folder, const VariedSweep& sweep);
-
-/// Draws `figures/reprojection.svg` from reprojection.csv, with one curve for each value. If the
-/// drawing fails, returns the reason. Returns "" if the figure was drawn, or if there is nothing to
-/// draw. Error: kIo.
-std::string DrawReprojection(const OutputFolder& folder, const VariedSweep& sweep,
-                             const std::function<bool()>& stop);
 
 }  // namespace alidade::internal

@@ -187,9 +187,8 @@ std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary
 /// Formats the means of the main metrics in a table for each estimator, with a row for each value.
 std::string SweepTable(const VariedSweep& sweep);
 
-/// Output folder of a sweep (docs/cli.md). It contains sweep.json, runs.csv, table.md,
-/// config.resolved.yaml, and failures.csv if a run failed. A varied sweep adds sweep.csv and a
-/// figure. A shard adds finished_runs.jsonl, which MergeShards() reads. Until all runs are
+/// Output folder of a sweep (docs/cli.md). It contains sweep.json, runs.csv, table.md, report.html,
+/// config.resolved.yaml, and failures.csv if a run failed. A varied sweep adds sweep.csv. A shard adds finished_runs.jsonl, which MergeShards() reads. Until all runs are
 /// finished, the folder is `FOLDER.partial`, and its finished_runs.jsonl contains the runs that are
 /// finished.
 class SweepFolder {
@@ -222,10 +221,8 @@ class SweepFolder {
   /// `FOLDER.partial`. `summaries` is the result of Summarise(result). Errors: kCannotCreate, kIo.
   void Write(const SweepResult& result, const std::vector<SweepSummary>& summaries,
              const Config& config);
-  /// Writes the folder of a varied sweep in the same way. If a figure is missing, returns the
-  /// reason, otherwise "". The drawing ends when `stop` returns true. Errors: kCannotCreate, kIo.
-  std::string Write(const VariedSweep& sweep, const Config& config,
-                    const std::function<bool()>& stop = {});
+  /// Writes the folder of a varied sweep in the same way.
+  void Write(const VariedSweep& sweep, const Config& config);
 
  private:
   struct Impl;

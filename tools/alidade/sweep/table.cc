@@ -9,7 +9,7 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/text.h"
 #include "alidade/experiment/metric_rows.h"
-#include "alidade/io/text_table.h"
+#include "alidade/sweep/conclusions.h"
 #include "alidade/sweep/worst_seeds.h"
 
 namespace alidade::internal {
@@ -80,13 +80,15 @@ Table MetricTable(const std::vector<SweepSummary>& summaries) {
   return table;
 }
 
-/// Formats the table of the verdicts, the table of the metrics, and the lines below the tables.
+/// Formats the conclusions, the table of the verdicts, the table of the metrics, and the lines below
+/// the tables.
 std::string FormatTables(const SweepResult& result, const std::vector<SweepSummary>& summaries,
                          TableFormat format) {
   const char* const title_end = format == TableFormat::kMarkdown ? ":\n\n" : ":\n";
-  return FormatTable(MakeTable(NamesOf(summaries), VerdictRows(summaries)), format) + '\n' +
+  return FormatConclusions(ConclusionsOf(result, summaries), format) +
+         FormatTable(MakeTable(NamesOf(summaries), VerdictRows(summaries)), format) + '\n' +
          kMetricsTitle + title_end + FormatTable(MetricTable(summaries), format) +
-         NeesLines(summaries) + ReferenceLines(result);
+         ReferenceLines(result);
 }
 
 }  // namespace
@@ -112,25 +114,12 @@ std::map<std::string, Interval> NeesBounds(const SweepSummary& summary) {
   return bounds;
 }
 
-std::string NeesLines(const std::vector<SweepSummary>& summaries) {
-  std::string lines;
-  constexpr std::string_view kDof = "nees.dof:";
-  for (const SweepSummary& summary : summaries) {
-    for (const auto& [key, dof] : summary.metrics) {
-      if (!key.starts_with(kDof) || summary.used == 0) continue;
-      const std::string owner = key.substr(kDof.size());
-      const auto mean = summary.metrics.find("nees.mean:" + owner);
-      if (mean == summary.metrics.end()) continue;
-      const double value = mean->second.mean;
-      const ScaleTest test = TestScale(value, dof.mean, static_cast<double>(summary.used));
-      if (test == ScaleTest::kPassed) continue;
-      lines += summary.name + ": over " + std::to_string(summary.used) + " runs, the NEES of " +
-               owner + " is " + RoundedText(value, 3) + ", and 1 is expected: the filter is " +
-               (test == ScaleTest::kTooLarge ? "overconfident" : "underconfident") +
-               ", even if single runs are too short to show it\n";
-    }
+std::string FormatConclusions(const std::vector<Conclusion>& conclusions, TableFormat format) {
+  std::string text;
+  for (const std::string& line : ConclusionLines(conclusions)) {
+    text += (format == TableFormat::kMarkdown ? "- " : "") + line + '\n';
   }
-  return lines.empty() ? "" : '\n' + lines;
+  return text.empty() ? "" : text + '\n';
 }
 
 std::string ReferenceLines(const SweepResult& result) {

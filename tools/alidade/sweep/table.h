@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "alidade/base/statistics.h"
+#include "alidade/io/text_table.h"
+#include "alidade/report/conclusion.h"
 #include "alidade/sweep/sweep.h"
 
 /// Texts and statistics that the tables and files of a sweep have in common.
@@ -22,10 +24,8 @@ std::int64_t CountWithheld(const SweepResult& result);
 /// time.
 std::map<std::string, Interval> NeesBounds(const SweepSummary& summary);
 
-/// Returns an empty line, and a line for each mean NEES over the runs that is too large or too
-/// small (TestScale). Runs are independent, so this test finds errors that a single run is too
-/// short to show. Returns "" if each mean passes.
-std::string NeesLines(const std::vector<SweepSummary>& summaries);
+/// Returns a line for each conclusion, and an empty line. Returns "" if there is no conclusion.
+std::string FormatConclusions(const std::vector<Conclusion>& conclusions, TableFormat format);
 
 /// Returns an empty line, and a line about the reference of the errors. This line also contains the
 /// number of runs in which the errors were withheld. Returns "" if the reference is truth. For a

@@ -1,22 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/sweep/vary_files.h"
 
-#include <algorithm>
 #include <array>
-#include <charconv>
-#include <chrono>
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <optional>
 
-#include "alidade/base/number_text.h"
 #include "alidade/experiment/metric_rows.h"
 #include "alidade/io/csv_file.h"
-#include "alidade/record/figure_script.h"
-#include "alidade/record/figures.h"
+#include "alidade/sweep/conclusions.h"
 #include "alidade/sweep/table.h"
-#include "alidade/sweep/value_labels.h"
 
 namespace alidade {
 namespace internal {
@@ -25,10 +15,10 @@ namespace {
 constexpr std::array<std::pair<const char*, double Spread::*>, 4> kSpread = {
     {{"mean", &Spread::mean}, {"p05", &Spread::p05}, {"p50", &Spread::p50}, {"p95", &Spread::p95}}};
 
-/// One estimator at each value.
+/// Summaries of one estimator, one for each value.
 using Column = std::vector<SweepSummary>;
 
-/// By estimator, then by value.
+/// Returns the summaries of each estimator.
 std::vector<Column> ColumnsOf(const VariedSweep& sweep) {
   std::vector<Column> columns(sweep.results.front().estimators.size());
   for (const SweepResult& result : sweep.results) {
@@ -38,20 +28,21 @@ std::vector<Column> ColumnsOf(const VariedSweep& sweep) {
   return columns;
 }
 
-/// The means as a comparison, a column for each value, whose numbers then share unit and decimals.
+/// Returns the means as the results of a run, with a column for each value. The numbers of a row
+/// then have the same unit.
 RunResult AsComparison(const Column& column) {
   RunResult comparison;
   for (const SweepSummary& summary : column) {
-    EstimatorResult& one = comparison.estimators.emplace_back();
-    one.units = summary.units;
-    for (const auto& [key, spread] : summary.metrics) one.metrics[key] = spread.mean;
+    EstimatorResult& estimator = comparison.estimators.emplace_back();
+    estimator.units = summary.units;
+    for (const auto& [key, spread] : summary.metrics) estimator.metrics[key] = spread.mean;
   }
   return comparison;
 }
 
-/// One estimator as a table: a row for each value.
+/// Table of one estimator, with a row for each value.
 struct ValueTable {
-  std::vector<std::string> header;  ///< without the label's
+  std::vector<std::string> header;  ///< names of the columns without the label
   std::vector<TableRow> rows;
 };
 
@@ -72,111 +63,6 @@ ValueTable TableOf(const VariedSweep& sweep, const Column& column) {
     }
   }
   return table;
-}
-
-/// The values as numbers, where all of them are.
-std::optional<std::vector<double>> NumbersOf(const std::vector<std::string>& values) {
-  std::vector<double> numbers;
-  for (const std::string& value : values) {
-    const char* const end = value.data() + value.size();
-    const auto [rest, error] = std::from_chars(value.data(), end, numbers.emplace_back());
-    if (error != std::errc() || rest != end || !std::isfinite(numbers.back())) return {};
-  }
-  return numbers;
-}
-
-/// Whether positive numbers lie too far apart for a linear axis.
-bool WantsLogAxis(const std::vector<double>& numbers) {
-  constexpr double kFar = 50.0;
-  const auto [low, high] = std::ranges::minmax_element(numbers);
-  return low != numbers.end() && *low > 0.0 && *high > kFar * *low;
-}
-
-std::string ColumnNamed(const std::string& name) { return "column(" + GnuplotQuoted(name) + ')'; }
-
-/// Settings of the axis of values, and the expression for it.
-std::string SetAxis(FigureScript& script, const VariedSweep& sweep) {
-  const std::vector<std::string>& values = sweep.variation.values;
-  if (const auto numbers = NumbersOf(values)) {
-    // One range for all panels, also where some values have no metrics.
-    const auto [low, high] = std::ranges::minmax(*numbers);
-    const bool log = WantsLogAxis(*numbers);
-    const double margin = 0.02 * (high - low);
-    if (log) script.Set("set logscale x\nset format x '%g'");
-    if (high > low) {
-      script.Set("set xrange [" + NumberText(log ? low / 1.5 : low - margin) + ':' +
-                 NumberText(log ? high * 1.5 : high + margin) + ']');
-    }
-    return '(' + ColumnNamed(sweep.variation.key) + ')';
-  }
-  const std::vector<std::string> labels = ValueLabels(values);
-  std::string tics;
-  for (std::size_t v = 0; v < values.size(); ++v) {
-    tics += (v > 0 ? ", " : "") + GnuplotQuoted(labels[v]) + ' ' + std::to_string(v);
-  }
-  script.Set("set xtics (" + tics + ")\nset xrange [-0.5:" + std::to_string(values.size()) +
-             " - 0.5]");
-  return "($0)";
-}
-
-/// Whether a metric is an error with a unit: of a block, or of a map.
-bool IsError(const std::string& key) { return key.starts_with("rmse:") || key == "map.rmse"; }
-
-/// The panel of one metric; none where it is the same everywhere, as of what is held at truth.
-void MetricPanel(FigureScript& script, const std::vector<Column>& columns, const std::string& key,
-                 const std::string& x, std::int64_t rows) {
-  std::vector<double> drawn;
-  std::string unit = key.starts_with("lag_ms") ? "ms" : key == "map.rmse" ? "m" : "";
-  for (const Column& column : columns) {
-    for (const SweepSummary& summary : column) {
-      const auto found = summary.metrics.find(key);
-      if (found == summary.metrics.end() || !std::isfinite(found->second.mean)) continue;
-      for (const auto& [name, member] : kSpread) drawn.push_back(found->second.*member);
-      const auto known = summary.units.find(key.substr(key.find(':') + 1));
-      if (known != summary.units.end() && key.starts_with("rmse")) unit = known->second;
-    }
-  }
-  if (std::ranges::adjacent_find(drawn, std::not_equal_to()) == drawn.end()) return;
-  std::string title = key;
-  std::ranges::replace(title, ':', ' ');
-  script.Panel(title + ": mean, 5 % to 95 %", InBrackets(unit));
-  script.Set(IsError(key) && WantsLogAxis(drawn) ? "set logscale y" : "unset logscale y");
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const std::string& name = columns[i].front().name;
-    std::string how = x;
-    for (const char* part : {".mean:", ".p05:", ".p95:"}) {
-      how.append(":(").append(ColumnNamed(name + part + key)).append(")");
-    }
-    const std::string style = " with yerrorlines ls " + std::to_string(i % 8 + 1) + " pt 7 ps 0.5";
-    script.Curve({"sweep.csv", rows, 1}, how + style, name);
-  }
-}
-
-FigureScript VariationFigure(const VariedSweep& sweep) {
-  FigureScript script("vary", "what " + sweep.variation.key + " does", sweep.variation.key);
-  const std::vector<Column> columns = ColumnsOf(sweep);
-  const auto rows = static_cast<std::int64_t>(sweep.results.size());
-  RunResult all;
-  for (const Column& column : columns) {
-    const RunResult some = AsComparison(column);
-    all.estimators.insert(all.estimators.end(), some.estimators.begin(), some.estimators.end());
-  }
-  const std::string x = SetAxis(script, sweep);
-  for (const std::string& key : OrderedMetrics(all)) {
-    const bool shown =
-        IsError(key) || key.starts_with("lag_ms:") || key.starts_with("nees.within95:");
-    if (shown && key.find('@') == key.npos) MetricPanel(script, columns, key, x, rows);
-  }
-  script.Panel("runs that diverged or were lost", "");
-  script.Set("unset logscale y\nset yrange [0:]");
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const std::string& name = columns[i].front().name;
-    script.Curve({"sweep.csv", rows, 1},
-                 x + ":(" + ColumnNamed(name + ".diverged") + " + " + ColumnNamed(name + ".lost") +
-                     ") with linespoints ls " + std::to_string(i % 8 + 1) + " pt 7 ps 0.5",
-                 name);
-  }
-  return script;
 }
 
 }  // namespace
@@ -222,6 +108,7 @@ std::string VariedMarkdown(const VariedSweep& sweep) {
       (sweep.variation.scope == Variation::Scope::kEstimators ? ", for the estimators only" : "") +
       ". Means over the runs that did not diverge.\n";
   if (!sweep.warning.empty()) text += "\nWarning: " + sweep.warning + ".\n";
+  text += '\n' + FormatConclusions(ConclusionsOf(sweep), TableFormat::kMarkdown);
   for (const Column& column : ColumnsOf(sweep)) {
     const ValueTable table = TableOf(sweep, column);
     const std::string corner = '`' + column.front().name + "`: " + sweep.variation.key;
@@ -230,25 +117,14 @@ std::string VariedMarkdown(const VariedSweep& sweep) {
   return text + ReferenceLines(sweep);
 }
 
-std::string DrawVariation(const OutputFolder& folder, const VariedSweep& sweep,
-                          const std::function<bool()>& stop) {
-  if (sweep.stopped()) return "the sweep was stopped";
-  const FigureScript script = VariationFigure(sweep);
-  folder.Write("figures/vary.gp", script.Text());
-  const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
-  const GnuplotResult result =
-      DrawFigure(folder, "vary.svg", {"figures/vary.gp"}, DrawingLimits{stop, end});
-  if (result.end == GnuplotResult::End::kFailed) return result.complaint;
-  return Obstacle(result.end);
-}
-
 }  // namespace internal
 
 std::string SweepTable(const VariedSweep& sweep) {
-  std::string text;
+  std::string text =
+      internal::FormatConclusions(internal::ConclusionsOf(sweep), internal::TableFormat::kText);
   for (const internal::Column& column : internal::ColumnsOf(sweep)) {
     const internal::ValueTable table = internal::TableOf(sweep, column);
-    if (!text.empty()) text += '\n';
+    if (column.front().name != sweep.results.front().estimators.front()) text += '\n';
     text +=
         column.front().name + ", means by " + sweep.variation.key + '\n' +
         FormatTable(internal::MakeTable(table.header, table.rows), internal::TableFormat::kText);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
 #include <string>
 
 #include "alidade/io/output_folder.h"
@@ -15,10 +14,5 @@ void WriteSweepCsv(const OutputFolder& folder, const VariedSweep& sweep);
 
 /// The text of `table.md`: for each estimator a row for each value.
 std::string VariedMarkdown(const VariedSweep& sweep);
-
-/// Draws `figures/vary.svg` from sweep.csv: errors, lags, coverage and divergence over the values.
-/// Returns why there is none, or "". Errors: kIo.
-std::string DrawVariation(const OutputFolder& folder, const VariedSweep& sweep,
-                          const std::function<bool()>& stop);
 
 }  // namespace alidade::internal

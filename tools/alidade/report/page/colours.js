@@ -14,6 +14,11 @@ const colorOf = (name) => {
 };
 
 const dashOf = (name) => DASHES[Math.max(0, Math.floor(NAMES.indexOf(name) / 5)) % 4];
+
+/** Colour and dashes of line `i` of a figure whose lines are no estimators. */
+const seriesColour = (i) => (page.dark ? DARK : LIGHT)[i % 5];
+const seriesDash = (i) => DASHES[Math.floor(i / 5) % 4];
+
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const colours = {};
 
@@ -23,6 +28,8 @@ function readPalette() {
 }
 
 const ink = () => colours.ink;
+/** Zone of values that a consistent estimator has. */
+const GOOD_ZONE = {alpha: 0.13, color: () => (page.dark ? '#2fbf93' : '#009E73')};
 const REJECTED = () => (page.dark ? '#FF6A3D' : '#D55E00');
 const nameStyle = document.head.appendChild(document.createElement('style'));
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Section "Consistency": NEES, NIS and whiteness of the innovations.
 
-const GOOD_ZONE = {alpha: 0.13, color: () => (page.dark ? '#2fbf93' : '#009E73')};
-
 /** Zone that contains 95 % of chi-square / dof. */
 const chiSquareZone = (dof) => ({
   kind: 'hband',
@@ -23,14 +21,16 @@ const logPlot = (spec, i, count) =>
   });
 
 function consistencySection(main) {
-  const box = section('consistency', 'Consistency', 'are the errors as large as σ?', main);
-  neesFigure(box);
   const sensors = unique(RUN.estimators.flatMap((e) => e.innovations.map((I) => I.sensor)));
   const hasNis = (e, sensor) => {
     const I = innovationsOf(e, sensor);
     return I && columnOf(I.nis).some(Number.isFinite);
   };
   const tested = sensors.filter((sensor) => RUN.estimators.some((e) => hasNis(e, sensor)));
+  const hasNees = RUN.estimators.some((e) => e.nees.length);
+  if (!tested.length && !hasNees) return;
+  const box = section('consistency', 'Consistency', 'are the errors as large as σ?', main);
+  neesFigure(box);
   if (!tested.length) return;
   nisFigure(box, tested);
   fold(

@@ -2,6 +2,7 @@
 // Elements of the document, and what a button does with their text.
 
 const SVGNS = 'http://www.w3.org/2000/svg';
+const SVG_FONT = 'font-family="system-ui, Liberation Sans, Arial, sans-serif"';
 
 function element(tag, props, ...kids) {
   const svg = /^(svg|path|rect|line)$/.test(tag);
@@ -80,3 +81,15 @@ function choice(label, items, value, change) {
 }
 
 const nameOf = (text, name = text) => element('span', {class: 'est', 'data-est': name}, text);
+
+/** A text whose names of estimators have their colours. */
+function withNames(text) {
+  const names = NAMES.slice().sort((a, b) => b.length - a.length);
+  const escaped = names.map((name) => name.replace(/[.*+?^${}()|[\]\\]/g, '\\$&'));
+  if (!escaped.length) return [text];
+  const pattern = new RegExp(`(?<![\\w-])(${escaped.join('|')})(?![\\w-]|[.]\\w)`);
+  return text.split(pattern).map((part, i) => (i % 2 ? nameOf(part) : part));
+}
+
+/** The last component of the name of a block. */
+const shortName = (block) => block.split('.').pop().replace(/_/g, ' ');

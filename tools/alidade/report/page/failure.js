@@ -63,9 +63,8 @@ function failureSection(main) {
   }
   const hints = CAUSES.filter(([pattern]) => pattern.test(DATA.reason)).map((cause) => cause[1]);
   if (hints.length) box.append(element('p', {}, element('b', {}, 'Likely: '), hints.join(' ')));
-  const isSweep = DATA.command.startsWith('alidade sweep');
-  if (isSweep) box.append(commandLine('Continue:', `${DATA.command} -o ${DATA.name} --resume`));
-  else box.append(commandLine('Repeat:', `${DATA.command} -o ${DATA.name} --force`));
+  if (SWEEP) box.append(commandLine('Continue:', `${DATA.command} -o FOLDER --resume`));
+  else if (DATA.command) box.append(commandLine('Repeat:', DATA.command));
   main.append(box);
   nav.push(['failure', 'Failure']);
   if (RUN) lastFramesSection(main);

@@ -64,9 +64,8 @@ function figure(parent, {title, hint, plots: ps, controls, wide, className}) {
     p.onPainted = () => {
       const lost = unique(ps.flatMap((q) => [...(q.lost || [])]));
       note.hidden = !lost.length || ps[0].full;
-      note.textContent = lost.length
-        ? `${list(lost)} ${lost.length > 1 ? 'leave' : 'leaves'} the axis: "fit all" shows everything.`
-        : '';
+      const verb = lost.length > 1 ? 'leave' : 'leaves';
+      note.textContent = `${list(lost)} ${verb} the axis: "fit all" shows everything.`;
     };
   const el = element(
     'figure',
@@ -92,8 +91,23 @@ function figure(parent, {title, hint, plots: ps, controls, wide, className}) {
   return el;
 }
 
-const fileName = (title) => (DATA.name + '-' + title).toLowerCase().replace(/[^a-z0-9]+/g, '-');
+const fileName = (title) => (DATA.title + '-' + title).toLowerCase().replace(/[^a-z0-9]+/g, '-');
 
+/** The legend of a saved figure: a line and a name for each visible estimator. */
+function svgLegend() {
+  let x = 14;
+  return NAMES.filter(shown)
+    .map((name) => {
+      const dash = dashOf(name).length ? ` stroke-dasharray="${dashOf(name)}"` : '';
+      const line = `<path d="M${x} 33h18" stroke="${colorOf(name)}" stroke-width="2.5"${dash}/>`;
+      const place = `x="${x + 23}" y="37" font-size="11" fill="${colours.ink}"`;
+      x += 40 + 6.6 * name.length;
+      return `${line}<text ${place}>${esc(name)}</text>`;
+    })
+    .join('');
+}
+
+/** The text of an SVG file with a title, the legend and the plots, one below another. */
 function exportSvg(title, ps) {
   const w = 900;
   let y = 44;
@@ -108,14 +122,12 @@ function exportSvg(title, ps) {
     body += `<g transform="translate(0 ${y})">${s.out.join('')}</g>`;
     y += hh + 4;
   }
-  let x = 14;
-  let key = '';
-  for (const n of NAMES.filter(shown)) {
-    key += `<path d="M${x} 33h18" stroke="${colorOf(n)}" stroke-width="2.5"${dashOf(n).length ? ` stroke-dasharray="${dashOf(n)}"` : ''}/><text x="${x + 23}" y="37" font-size="11" fill="${colours.ink}">${esc(n)}</text>`;
-    x += 40 + 6.6 * n.length;
-  }
   redraw();
-  return `<svg xmlns="${SVGNS}" width="${w}" height="${y}" viewBox="0 0 ${w} ${y}" font-family="system-ui, Liberation Sans, Arial, sans-serif"><rect width="${w}" height="${y}" fill="${colours.panel}"/><text x="14" y="18" font-size="14" font-weight="600" fill="${colours.ink}">${esc(title)}</text>${key}${body}</svg>\n`;
+  const ground = `<rect width="${w}" height="${y}" fill="${colours.panel}"/>`;
+  const font = `font-size="14" font-weight="600" fill="${colours.ink}"`;
+  const head = `<text x="14" y="18" ${font}>${esc(title)}</text>${svgLegend()}`;
+  const size = `width="${w}" height="${y}" viewBox="0 0 ${w} ${y}"`;
+  return `<svg xmlns="${SVGNS}" ${size} ${SVG_FONT}>${ground}${head}${body}</svg>\n`;
 }
 
 function exportPng(title, ps) {

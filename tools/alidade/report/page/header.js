@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Header with facts and legend; configuration and files at the end.
+// Header with facts and legend.
 
 function legend() {
   const keys = NAMES.map((name, i) => {
     const e = RUN && RUN.estimators[i];
-    const v = e && verdictOf(e);
+    const v = e && e.verdict && verdictOf(e);
     return element(
       'button',
       {
@@ -102,96 +102,12 @@ function headerOf() {
       ),
     ),
     element('ul', {class: 'facts'}, facts),
-    element(
-      'span',
-      {class: 'cmd'},
-      DATA.command,
-      copyButton(() => DATA.command),
-    ),
-  );
-}
-
-function tailSections(main) {
-  const s = section('config', 'Configuration and files', '', main);
-  if (DATA.config)
-    fold(
-      s,
-      'Resolved configuration',
-      `${DATA.config.split('\n').length} lines: runs again as it is`,
-      (box) =>
-        box.append(
-          element(
-            'div',
-            {class: 'panel'},
-            element(
-              'p',
-              {class: 'side', style: 'margin:0 0 8px'},
-              copyButton(() => DATA.config),
-              element(
-                'button',
-                {
-                  class: 'btn small',
-                  onclick: () => save('config.resolved.yaml', 'text/yaml', DATA.config),
-                },
-                'save',
-              ),
-            ),
-            element('pre', {}, DATA.config),
-          ),
-        ),
-    );
-  if (DATA.files.length)
-    fold(s, 'Files of this folder', plural(DATA.files.length, 'entry', 'entries'), (box) =>
-      box.append(
-        element(
-          'p',
-          {class: 'panel'},
-          DATA.files
-            .filter((f) => !f.endsWith('/') && !f.startsWith('figures'))
-            .map((f) => [element('a', {href: f}, f), '  ']),
-        ),
-      ),
-    );
-  fold(s, 'Words and keys', 'NEES, NIS, gate; the keyboard', (box) =>
-    box.append(
+    DATA.command &&
       element(
-        'div',
-        {class: 'panel'},
-        element(
-          'dl',
-          {},
-          [
-            [
-              'NEES',
-              "normalised estimation error squared, e' P⁻¹ e / dof: 1 in the mean if the covariance P tells the truth; needs truth.",
-            ],
-            [
-              'NIS',
-              "normalised innovation squared, r' S⁻¹ r / dof: the same for measurements; needs no truth.",
-            ],
-            ['gate', 'measurements beyond this NIS are rejected.'],
-            [
-              'overconfident',
-              'NEES above its 95 % bounds: the errors are larger than σ says. Dangerous where others trust σ.',
-            ],
-            ['underconfident', 'NEES below its bounds: σ is larger than it need be.'],
-            ['lost', 'the error was beyond 10 σ for 20 frames on end.'],
-            ['RMSE', 'root of the mean squared error over the frames.'],
-            [
-              'full information',
-              'the best that is possible online: at each frame a batch of all data up to it.',
-            ],
-            [
-              'mouse',
-              'drag: zoom in time; shift-drag: move; ctrl-wheel: zoom; double-click: all; click: keep the cursor (the map follows it).',
-            ],
-            [
-              'keys',
-              '1 to 9: estimators; on a plot: arrows move the cursor, shift-arrows the window, + and − zoom, 0 shows all.',
-            ],
-          ].map(([a, b]) => [element('dt', {}, a), element('dd', {}, b)]),
-        ),
+        'span',
+        {class: 'cmd'},
+        DATA.command,
+        copyButton(() => DATA.command),
       ),
-    ),
   );
 }

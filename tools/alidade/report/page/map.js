@@ -468,7 +468,8 @@ class MapView {
     });
     if (!range) return;
     const x0 = this.w - 196;
-    const name = {error: 'position error', sigma: 'position σ', time: 'time'}[this.options.paintBy];
+    const names = {error: 'position error', sigma: 'position σ', time: 'time'};
+    const name = names[this.options.paintBy];
     const [g, u] = unitFor(this.options.paintBy === 'time' ? 's' : 'm', range[1]);
     for (let i = 0; i < 60; i++) s.rect(x0 + i * 3, this.hh - 24, 3.2, 8, {fill: ramp(i / 59)});
     s.text(`${name} [${u}]`, x0, this.hh - 33, {color: colours.ink, halo: true});

@@ -16,7 +16,8 @@ function toPaper() {
       p.paint(svg, w, hh);
       p.dirty = true;
       const box = element('div', {class: 'printed'});
-      box.innerHTML = `<svg xmlns="${SVGNS}" viewBox="0 0 ${w} ${hh}" width="100%" height="${hh}" font-family="system-ui, Liberation Sans, Arial, sans-serif">${svg.out.join('')}</svg>`;
+      const size = `viewBox="0 0 ${w} ${hh}" width="100%" height="${hh}"`;
+      box.innerHTML = `<svg xmlns="${SVGNS}" ${size} ${SVG_FONT}>${svg.out.join('')}</svg>`;
       p.el.append(box);
     }
 }

@@ -19,7 +19,20 @@ const resizer = new ResizeObserver((entries) => {
   }
 });
 
-/** spec: {label, height, time, x: {...}, y: {unit, factor, log, range}, layers(), last, name}. See README.md, "Plots". */
+const colourOfLayer = (layer) => (layer.color ? layer.color() : colorOf(layer.est));
+
+/**
+ * A plot. spec: {label, name, height, time, first, last, zero, left, x, y, layers()}.
+ *
+ *   time     true: the x axis is the visible time of the page
+ *   last     false: no time labels, because another plot is below
+ *   zero     true: the y axis is symmetric about zero
+ *   x, y     {label, unit, log, range(layers), ticks}; y.rows: names of categories at 0, 1, ...
+ *   layers() the layers at present: {kind, x, y, ...}; kind is line, band, dots, h, v, hband or
+ *            custom. `est` is the estimator of a layer, `tip(i)` the content of its tip
+ *
+ * Numbers are in SI units. The axis selects the prefix of the unit.
+ */
 class Plot {
   constructor(spec) {
     this.spec = spec;
@@ -300,7 +313,7 @@ class Plot {
     const {l, r, t, b} = this.f;
     const X = this.X;
     const Y = this.Y;
-    const color = L.color ? L.color() : colorOf(L.est);
+    const color = colourOfLayer(L);
     const a = dim(L.est) * (L.alpha === undefined ? 1 : L.alpha);
     const time = this.spec.time;
     if (L.kind === 'h') {
@@ -377,7 +390,8 @@ class Plot {
       return;
     }
     if (L.kind === 'dots') {
-      // Dense clouds are drawn as the pixels that they cover, which is the same picture. L.keep: every mark is drawn.
+      // A dense cloud is drawn as the pixels that it covers, which is the same picture. L.keep:
+      // every mark is drawn.
       const dense = !L.keep && i1 - i0 > 4000;
       const H = Math.ceil(b - t) + 2;
       const W = Math.ceil(width) + 2;
@@ -433,7 +447,7 @@ class Plot {
           if (L.kind === 'line' && L.name) {
             const y = this.Y.to(L.y[nearest(L.x, at)]);
             if (y >= t && y <= b) {
-              ctx.fillStyle = L.color ? L.color() : colorOf(L.est);
+              ctx.fillStyle = colourOfLayer(L);
               ctx.beginPath();
               ctx.arc(this.X.to(L.x[nearest(L.x, at)]), y, 3, 0, 7);
               ctx.fill();
@@ -460,13 +474,7 @@ class Plot {
         element(
           'tr',
           {},
-          element(
-            'td',
-            {
-              style: `color:${L.color ? L.color() : colorOf(L.est)};font-weight:600;text-align:left`,
-            },
-            L.name,
-          ),
+          element('td', {class: 'name', style: `color: ${colourOfLayer(L)}`}, L.name),
           element(
             'td',
             {},
@@ -477,12 +485,13 @@ class Plot {
         ),
       );
     }
+    const hasSigma = this.layers.some((L) => L.s && L.name);
     return [
       element('b', {}, 't = ' + clock(at) + ' s'),
       rows.length ? element('table', {}, rows) : null,
-      this.layers.some((L) => L.s && L.name) ? element('span', {class: 'quiet'}, '± is 3σ') : null,
+      hasSigma ? element('span', {class: 'quiet'}, '± is 3σ') : null,
       ev.map(([n, v]) =>
-        element('p', {style: 'margin:3px 0 0'}, nameOf(n), ` ${v[1].replace(/_/g, ' ')}: ${v[2]}`),
+        element('p', {class: 'event'}, nameOf(n), ` ${v[1].replace(/_/g, ' ')}: ${v[2]}`),
       ),
     ];
   }
@@ -589,12 +598,14 @@ class Plot {
       if (L.x && L.y && L.kind !== 'custom') {
         const name =
           L.est && L.name && L.est !== L.name ? L.est + ' ' + L.name : L.name || L.est || L.k;
-        const list = this.spec.label || '';
-        for (let i = 0; i < L.x.length; i++)
-          if (!L.only || L.only(i))
-            rows.push(
-              `"${list}","${name}",${L.x[i] + (this.spec.time ? T0 : 0)},${L.y[i] === L.y[i] ? L.y[i] : ''},${L.s ? L.s[i] : ''}`,
-            );
+        const quoted = (text) => `"${text.replace(/"/g, '""')}"`;
+        const start = [quoted(this.spec.label || ''), quoted(name)];
+        for (let i = 0; i < L.x.length; i++) {
+          if (L.only && !L.only(i)) continue;
+          const x = L.x[i] + (this.spec.time ? T0 : 0);
+          const y = Number.isNaN(L.y[i]) ? '' : L.y[i];
+          rows.push([...start, x, y, L.s ? L.s[i] : ''].join(','));
+        }
       }
     return rows;
   }

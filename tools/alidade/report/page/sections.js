@@ -29,6 +29,20 @@ function fold(parent, title, sub, build) {
   return d;
 }
 
+const TONES = {
+  good: ['good', '✓'],
+  neutral: ['calm', '·'],
+  warning: ['warn', '▲'],
+  bad: ['bad', '✕'],
+};
+
+/** Items of the list "What happened": conclusions of the program. */
+const conclusionItems = (conclusions) =>
+  conclusions.map(({tone, text, details}) => {
+    const [cls, mark] = TONES[tone];
+    return {cls, mark, text: withNames(text), more: details && withNames(details)};
+  });
+
 function storyList(items) {
   return element(
     'ul',

@@ -42,7 +42,7 @@ function legendBar(hasTime) {
 }
 
 function verdictChips() {
-  const chips = RUN.estimators.map((e) => {
+  const chips = JUDGED.map((e) => {
     const {cls, mark, state, because} = verdictOf(e);
     const name = element('b', {}, nameOf(e.name));
     return element('div', {class: 'chip ' + cls, title: because}, name, ` ${mark} ${state}`);
@@ -52,32 +52,32 @@ function verdictChips() {
 
 function summarySection(main) {
   const box = section('summary', 'What happened', '', main);
-  if (RUN) box.append(verdictChips());
-  const items = [
-    ...(COMPARISON ? compareStory() : []),
-    ...(RUN ? story() : []),
-    ...(SWEEP ? sweepStory() : []),
-  ];
+  if (JUDGED.length) box.append(verdictChips());
+  const results = COMPARISON || SWEEP || DATA.evaluation || DATA.bundle || {};
+  const conclusions = conclusionItems(results.conclusions || []);
+  const items = [...conclusions, ...(JUDGED.length ? story() : [])];
   if (items.length) box.append(element('div', {class: 'panel'}, storyList(items)));
   return box;
 }
 
 function runSections(main, summary) {
-  summary.append(runTablePanel());
-  metricFold(summary);
+  if (JUDGED.length) {
+    summary.append(runTablePanel());
+    metricFold(summary);
+  }
   mapSection(main);
   stateSection(main);
   consistencySection(main);
   measurementSection(main);
+  if (!JUDGED.length) return;
   insideSection(main);
   eventSection(main);
 }
 
 function footer() {
   const program = DATA.program ? ' ' + DATA.program : '';
-  const folder = element('code', {}, DATA.name);
-  const text = '. This page is one file and needs no network.';
-  return element('footer', {}, `Written by alidade${program} from `, folder, text);
+  const text = `Written by alidade${program}. This page is one file and needs no network.`;
+  return element('footer', {}, text);
 }
 
 function listen() {
@@ -104,6 +104,8 @@ function start() {
   document.getElementById('app').append(head, legendBar(hasTime), main, footer(), tip);
   if (DATA.status !== 'ok') failureSection(main);
   const summary = summarySection(main);
+  if (DATA.evaluation) evaluationSection(main);
+  if (DATA.bundle) bundleSection(main);
   if (COMPARISON) compareSection(main);
   if (SWEEP && SWEEP.vary) varySection(main);
   if (SWEEP) sweepSection(main);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Section "Estimates and errors".
 
-/** Series of a block: [{label, unit, value, sigma, error, truth}] for each element; quaternions as roll, pitch, yaw. */
+/** Series of each element of a block; those of a quaternion are roll, pitch and yaw. */
 const seriesMemo = new Map();
 
 function series(e, b) {
@@ -138,12 +138,6 @@ function statePlots(block, what) {
 }
 
 function stateSection(main) {
-  const s = section(
-    'state',
-    'Estimates and errors',
-    'drag to zoom, double-click for all, click to keep the cursor',
-    main,
-  );
   const box = element('div');
   const blocks = [];
   for (const e of RUN.estimators)
@@ -154,7 +148,14 @@ function stateSection(main) {
         if (!q.error.length) blocks[blocks.indexOf(q)] = b;
       }
   const usable = blocks.filter((b) => b.error.length || b.sigma.length);
-  const start = usable.find((b) => b.error.length) || usable[0] || blocks[0];
+  if (!usable.length) return;
+  const s = section(
+    'state',
+    'Estimates and errors',
+    'drag to zoom, double-click for all, click to keep the cursor',
+    main,
+  );
+  const start = usable.find((b) => b.error.length) || usable[0];
   let block = start;
   let what =
     start.size > 1 || start.value.length > 1 ? (start.error.length ? 'error' : 'value') : 'both';
@@ -176,14 +177,17 @@ function stateSection(main) {
             '. '
           : '') +
         (isError
-          ? 'Errors (estimate minus truth) should look like noise and stay inside their 3σ band, in all but 0.3 % of the frames.'
+          ? 'Errors are estimate minus truth and should look like noise' +
+            (block.sigma.length
+              ? ', inside their 3σ band in all but 0.3 % of the frames.'
+              : '.')
           : ''),
     });
   };
   s.append(
     element(
       'div',
-      {class: 'side', style: 'margin-bottom:10px'},
+      {class: 'side'},
       choice(
         '',
         usable.map((b) => [b.name, b.name.split('.').pop().replace(/_/g, ' ')]),

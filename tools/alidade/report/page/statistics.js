@@ -65,15 +65,6 @@ function quantiles(values, ps) {
   });
 }
 
-function wilson(k, n) {
-  const z = 1.959964;
-  const p = k / n;
-  const d = 1 + (z * z) / n;
-  const c = p + (z * z) / (2 * n);
-  const w = z * Math.sqrt((p * (1 - p)) / n + (z * z) / (4 * n * n));
-  return [Math.max(0, (c - w) / d), Math.min(1, (c + w) / d)];
-}
-
 /** Index of the first t >= v. */
 function lower(t, v) {
   let a = 0;

@@ -123,6 +123,8 @@ function eachRun(cells, W, H, f) {
 const esc = (s) =>
   String(s).replace(/[&<>"]/g, (c) => ({'&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;'})[c]);
 
+const fixed = (v) => v.toFixed(1);
+
 class SvgSurface {
   constructor() {
     this.out = [];
@@ -152,9 +154,9 @@ class SvgSurface {
     if (d) this.out.push(`<path d="${d}"${this.attrs(o)}/>`);
   }
   rect(x, y, w, hh, o) {
-    this.out.push(
-      `<rect x="${x.toFixed(1)}" y="${y.toFixed(1)}" width="${Math.max(0, w).toFixed(1)}" height="${Math.max(0, hh).toFixed(1)}"${this.attrs(o)}/>`,
-    );
+    const [left, top, width, height] = [x, y, Math.max(0, w), Math.max(0, hh)].map(fixed);
+    const box = `x="${left}" y="${top}" width="${width}" height="${height}"`;
+    this.out.push(`<rect ${box}${this.attrs(o)}/>`);
   }
   marks(pts, shape, r, o) {
     let d = '';
@@ -189,18 +191,17 @@ class SvgSurface {
   }
   text(s, x, y, o = {}) {
     const anchor = {center: 'middle', right: 'end'}[o.align] || 'start';
-    this.out.push(
-      `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" dy=".35em" text-anchor="${anchor}" font-size="${o.size || 11}" font-weight="${o.weight || 400}" fill="${o.color || colours.muted}"` +
-        (o.halo ? ` stroke="${colours.panel}" stroke-width="3" paint-order="stroke"` : '') +
-        (o.turn ? ` transform="rotate(-90 ${x.toFixed(1)} ${y.toFixed(1)})"` : '') +
-        `>${esc(s)}</text>`,
-    );
+    const place = `x="${fixed(x)}" y="${fixed(y)}" dy=".35em" text-anchor="${anchor}"`;
+    const font = `font-size="${o.size || 11}" font-weight="${o.weight || 400}"`;
+    const halo = o.halo ? ` stroke="${colours.panel}" stroke-width="3" paint-order="stroke"` : '';
+    const turn = o.turn ? ` transform="rotate(-90 ${fixed(x)} ${fixed(y)})"` : '';
+    const fill = o.color || colours.muted;
+    this.out.push(`<text ${place} ${font} fill="${fill}"${halo}${turn}>${esc(s)}</text>`);
   }
   clip(x, y, w, hh) {
     const id = 'c' + (SvgSurface.ids = (SvgSurface.ids || 0) + 1);
-    this.out.push(
-      `<clipPath id="${id}"><rect x="${x}" y="${y}" width="${w}" height="${hh}"/></clipPath><g clip-path="url(#${id})">`,
-    );
+    const box = `x="${x}" y="${y}" width="${w}" height="${hh}"`;
+    this.out.push(`<clipPath id="${id}"><rect ${box}/></clipPath><g clip-path="url(#${id})">`);
   }
   unclip() {
     this.out.push('</g>');

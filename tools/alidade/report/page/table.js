@@ -1,7 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Table whose rows are sorted by a click on a column.
 
-/** Rows are sorted by a click on a column. columns: {name, sub, get(row), show(row), text, best: 'min' or 'one'} */
+/**
+ * A table. columns: {name, sub, title, text, wrap, best, get(row), show(row)}.
+ *
+ *   get(row)   number or text that sorts the rows
+ *   show(row)  content of the cell; default: the formatted number
+ *   text       true: the column contains texts
+ *   best       `min` or `one`: the best value of the column is bold
+ */
 function dataTable(columns, rows, {off, tall} = {}) {
   const body = element('tbody');
   let by = null;
@@ -108,7 +115,7 @@ function dataTable(columns, rows, {off, tall} = {}) {
                 .join(' & ') + ' \\\\',
           )
           .join('\n')}\n\\end{tabular}\n`
-      : `| ${head.join(' | ')} |\n|${head.map(() => '---').join('|')}|\n${all.map((r) => '| ' + r.join(' | ') + ' |').join('\n')}\n`;
+      : [head, head.map(() => '---'), ...all].map((row) => `| ${row.join(' | ')} |\n`).join('');
   };
   return el;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Timeline: the whole run on one line, with the visible time.
 
-/** The whole run on a line: segments, events, the zoomed window; drag selects, a click goes there. */
+/** Segments, events and the visible window. A drag selects a window, a click moves it. */
 class Timeline {
   constructor() {
     this.spec = {label: 'timeline'};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lines and bands as pixels. No peak is lost, however many points there are.
 
-/** Points of a line: all of them, or first, least, greatest and last of each pixel column, so no peak is lost. */
+/** Points of a line: all, or the first, least, greatest and last of each pixel column. */
 function trace(x, y, i0, i1, X, Y, width, gap) {
   const out = [];
   const {k, c} = X; // x is linear where there are many points
@@ -66,7 +66,7 @@ function trace(x, y, i0, i1, X, Y, width, gap) {
   return out;
 }
 
-/** The outline of c - m s ... c + m s (or lo ... hi), widest in each pixel column, in pieces between gaps. */
+/** Outline of the band from c - m s to c + m s, or from lo to hi, in pieces between gaps. */
 function outline(L, i0, i1, X, Y, width) {
   const pieces = [];
   const dense = i1 - i0 > 3 * width;

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Access to the runs of a sweep.
+
+const metricUnit = (metric) => SWEEP.units[metric] || '';
+
+/** Distance of a value from the best value of the metric, for the rank of a run; NaN: no rank. */
+function lossOf(metric, value) {
+  const goal = SWEEP.goals[metric];
+  if (goal === 'one') return Math.abs(Math.log(value));
+  return goal === 'zero' ? value : NaN;
+}
+
+/** The values of a metric in the runs of a group; empty if the metric does not exist. */
+const valuesOf = (group, metric) =>
+  group.columns[metric] === undefined ? [] : columnOf(group.columns[metric]);
+const finiteValues = (group, metric) => Array.from(valuesOf(group, metric)).filter(Number.isFinite);
+
+const meanOf = (values) => sum(values) / values.length;
+
+/** True if a logarithmic axis suits the values. */
+function wantsLogAxis(values) {
+  const [low, high] = quantiles(values.filter(Number.isFinite), [0.05, 0.95]);
+  return !values.some((v) => v <= 0) && high / low > 8;
+}
+
+/** The values of the varied key: {value, label}. */
+const variedValues = () => {
+  const labels = new Map(SWEEP.groups.map((g) => [g.value, g.label]));
+  return [...labels].map(([value, label]) => ({value, label}));
+};
+
+/** The command that repeats the run of a seed in a group. */
+function seedCommand(group, seed) {
+  return `alidade run ${DATA.config_file || 'CONFIG'} --seed ${seed}${group.options}`;
+}
+
+/** The indices of the five worst runs of a group, the worst first. */
+function worstRuns(group, metric) {
+  const losses = Array.from(valuesOf(group, metric), (v, i) => [lossOf(metric, v), i]);
+  return losses
+    .filter(([loss]) => Number.isFinite(loss))
+    .sort((a, b) => b[0] - a[0])
+    .slice(0, 5)
+    .map(([, i]) => i);
+}

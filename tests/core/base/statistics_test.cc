@@ -103,5 +103,18 @@ TEST(ChiSquareQuantile, IsDefinedOnTheUnitInterval) {
   EXPECT_THROW(ChiSquareQuantile(1.5, 1), ContractViolation);
 }
 
+// The ends p of the interval are those with |f - p| = 1.96 sqrt(p (1 - p) / n).
+TEST(ShareInterval, SolvesTheEquationOfWilson) {
+  for (const std::int64_t successes : {0, 1, 7, 20}) {
+    const double n = 20.0, share = static_cast<double>(successes) / n;
+    const Interval interval = ShareInterval(successes, 20);
+    for (const double p : {interval.low, interval.high}) {
+      EXPECT_NEAR(std::abs(share - p), 1.959964 * std::sqrt(p * (1.0 - p) / n), 1e-6) << successes;
+    }
+    EXPECT_LE(interval.low, share);
+    EXPECT_GE(interval.high, share);
+  }
+}
+
 }  // namespace
 }  // namespace alidade

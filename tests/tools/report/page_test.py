@@ -94,15 +94,15 @@ class PageTest(unittest.TestCase):
         """Runs a command with the output folder `name`, and opens the page of this folder."""
         folder = self.root / name
         if not folder.exists():
-            self.alidade(*arguments, "-o", folder)
-        page = self.root / (name + ".html")
-        written = self.alidade("report", folder, "-o", page)
-        self.assertEqual(written.returncode, 0, written.stderr)
+            self.last = self.alidade(*arguments, "-o", folder)
+        self.open_page(folder / "report.html")
+        return folder
+
+    def open_page(self, page):
         for kind in ("browser", "performance"):
             self.browser.get_log(kind)  # drops the messages of the previous page
         self.browser.get(page.as_uri())
         self.browser.execute_script(DRAW_ALL)
-        return folder
 
     def script(self, text, *arguments):
         return self.browser.execute_script(text, *arguments)
@@ -144,7 +144,7 @@ class PageTest(unittest.TestCase):
                 self.expect_mean_nees(estimator, nees)
         chip = self.script("return document.querySelector('.chip').innerText")
         self.assertIn(run["estimators"]["ekf"]["verdict"]["state"], chip)
-        self.assertLess((self.root / "depth.html").stat().st_size, 400_000)
+        self.assertLess((folder / "report.html").stat().st_size, 400_000)
 
     def expect_mean_nees(self, estimator, nees):
         mean = self.script("""
@@ -157,25 +157,63 @@ class PageTest(unittest.TestCase):
         self.assertAlmostEqual(mean, expected, delta=1e-4 * expected)
 
     def test_slam_run(self):
-        self.open("slam", "run", "10_slam_scene/config.yaml")
+        folder = self.open("slam", "run", "10_slam_scene/config.yaml")
         self.expect_sound()
         for section in ("map", "state", "consistency", "measurements", "inside"):
             self.assertTrue(self.browser.find_elements(By.ID, section), section)
-        self.assertLess((self.root / "slam.html").stat().st_size, 2_000_000)
+        self.assertLess((folder / "report.html").stat().st_size, 2_000_000)
         slider = "document.querySelector('.slider input')"
         self.script(f"{slider}.value = 500; {slider}.dispatchEvent(new Event('input'))")
         full = self.script("return alidadeReport.page.full")
         self.assertAlmostEqual(self.script("return alidadeReport.page.time"), sum(full) / 2, 2)
 
     def test_comparison(self):
-        self.open("comparison", "compare", "05_depth_principled/config.yaml")
+        folder = self.open("comparison", "compare", "05_depth_principled/config.yaml")
         self.expect_sound()
         self.assertTrue(self.browser.find_elements(By.ID, "comparison"))
+        self.expect_conclusions(folder / "compare.json")
 
     def test_sweep(self):
-        self.open("sweep", "sweep", "05_depth_principled/config.yaml", "--runs", "5")
+        folder = self.open("sweep", "sweep", "05_depth_principled/config.yaml", "--runs", "5")
+        self.assertTrue(self.last.stdout.endswith(f"\nreport   {folder}/report.html\n"))
         self.expect_sound()
         self.assertTrue(self.browser.find_elements(By.ID, "runs"))
+        self.expect_conclusions(folder / "sweep.json")
+
+    def expect_conclusions(self, file):
+        """Expects the sentences of a JSON file, which the terminal prints too, on the page."""
+        text = self.script("return document.querySelector('.story').textContent")
+        conclusions = json.loads(file.read_text())["conclusions"]
+        self.assertGreater(len(conclusions), 0)
+        for conclusion in conclusions:
+            self.assertIn(conclusion["text"], text)
+
+    def test_varied_sweep(self):
+        self.open("varied", "sweep", "10_slam_scene/config.yaml", "--runs", "2", "--set",
+                  "source.max_frames=30", "--vary", "sensors.pixels.sigma_px=1,2")
+        self.expect_sound()
+        titles = self.script("return [...document.querySelectorAll('h3')].map(h => h.textContent)")
+        self.assertIn("map.rmse", titles)
+        self.assertIn("Reprojection error, ekf, pixels", titles)
+        command = self.script("return document.querySelector('td .cmd').textContent")
+        self.assertIn("--set sensors.pixels.sigma_px=1", command)
+
+    def test_trajectories(self):
+        folder = self.open("slam", "run", "10_slam_scene/config.yaml")
+        page = self.root / "trajectory.html"
+        estimate, truth = folder / "ekf/trajectory.tum", folder / "truth.tum"
+        written = self.alidade("report", estimate, "--reference", truth, "-o", page)
+        self.assertEqual(written.stdout, f"report   {page}\n", written.stderr)
+        self.open_page(page)
+        self.expect_sound()
+        for section in ("errors", "map", "state"):
+            self.assertTrue(self.browser.find_elements(By.ID, section), section)
+        aligned = self.alidade("eval", truth, estimate, "-as", "-o", page)
+        self.assertIn(f"report   {page}", aligned.stdout)
+        self.open_page(page)
+        self.expect_sound()
+        self.assertIn("alignment sim3",
+                      self.script("return document.querySelector('.story').textContent"))
 
     def test_legend_hides_an_estimator(self):
         self.open_depth()

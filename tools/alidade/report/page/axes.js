@@ -18,7 +18,7 @@ function scale(lo, hi, a, b, log) {
     b,
     k,
     c,
-    to: log ? (v) => c + k * Math.log10(v > 1e-300 ? v : 1e-300) : (v) => c + k * v,
+    to: log ? (v) => c + k * Math.log10(v <= 1e-300 ? 1e-300 : v) : (v) => c + k * v,
     from: (p) => (log ? 10 ** ((p - c) / k) : (p - c) / k),
   };
 }

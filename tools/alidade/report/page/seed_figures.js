@@ -71,7 +71,7 @@ function seedFigure(groups, metric) {
         x: {
           label: metric,
           unit: metricUnit(metric),
-          log: wantsLogAxis(groups.flatMap((g) => finiteValues(g, metric))),
+          log: isLogMetric(metric, groups.flatMap((g) => finiteValues(g, metric))),
         },
         y: {unit: '', rows, range: () => [-0.6, rows.length - 0.4]},
         layers: () => [
@@ -124,7 +124,7 @@ function histogramLine(group, metric, [low, high], log) {
 function distributionFigure(groups, metric, shape, controls) {
   const isShare = shape === 'ecdf';
   const values = () => visibleGroups(groups).flatMap((g) => finiteValues(g, metric));
-  const log = wantsLogAxis(groups.flatMap((g) => finiteValues(g, metric)));
+  const log = isLogMetric(metric, groups.flatMap((g) => finiteValues(g, metric)));
   const range = () => {
     const [low, high] = quantiles(values(), [0, 1]);
     const margin = 0.03 * (high - low);
@@ -174,8 +174,8 @@ function twoMetricFigure(groups, metric, second, controls) {
         label: second,
         name: 'two metrics',
         height: 260,
-        x: {label: metric, unit: metricUnit(metric), log: wantsLogAxis(all(metric))},
-        y: {unit: metricUnit(second), log: wantsLogAxis(all(second))},
+        x: {label: metric, unit: metricUnit(metric), log: isLogMetric(metric, all(metric))},
+        y: {unit: metricUnit(second), log: isLogMetric(second, all(second))},
         layers: () =>
           visibleGroups(groups)
             .filter((group) => valuesOf(group, second).length)

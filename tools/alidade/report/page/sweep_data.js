@@ -23,6 +23,9 @@ function wantsLogAxis(values) {
   return !values.some((v) => v <= 0) && high / low > 8;
 }
 
+/** True if a logarithmic axis suits the values of a metric. The axis of a share is linear. */
+const isLogMetric = (metric, values) => SWEEP.goals[metric] !== '0.95' && wantsLogAxis(values);
+
 /** The values of the varied key: {value, label}. */
 const variedValues = () => {
   const labels = new Map(SWEEP.groups.map((g) => [g.value, g.label]));

@@ -6,11 +6,12 @@ function valueAxis() {
   const values = variedValues();
   const numbers = values.map(({value}) => Number(value));
   const isNumeric = numbers.every(Number.isFinite);
+  const labelOf = ({value, label}) => (isNumeric ? String(+Number(value).toPrecision(3)) : label);
   const positions = isNumeric ? numbers : values.map((_, i) => i);
   return {
     positions,
     log: isNumeric && Math.min(...numbers) > 0 && Math.max(...numbers) / Math.min(...numbers) > 4,
-    ticks: values.map(({label}, i) => [positions[i], label]),
+    ticks: values.map((value, i) => [positions[i], labelOf(value)]),
   };
 }
 
@@ -66,7 +67,7 @@ function variedFigure(metric, axis) {
         name: metric,
         height: 210,
         x: {label: SWEEP.vary, unit: '', log: axis.log, ticks: axis.ticks},
-        y: {unit: metricUnit(metric), log: wantsLogAxis(values)},
+        y: {unit: metricUnit(metric), log: isLogMetric(metric, values)},
         layers: () => [
           SWEEP.goals[metric] === 'one' && one,
           ...lines.flatMap((line) => spreadLayers(line, metric, axis)),

@@ -126,5 +126,28 @@ TEST(ColumnPool, RegularTimesAreALine) {
   EXPECT_EQ(ValuesOf<double>(items[1]), (std::vector<double>{0.0, 1e-9, 5.0}));
 }
 
+TEST(ColumnPool, LongSeriesHave16Bits) {
+  ReadablePool pool;
+  std::vector<double> values = {0.0, kNan, kInfinity, -kInfinity, 1e-9, -1e9, 2.5};
+  EXPECT_EQ(pool.AddSeries(values), pool.AddNumbers(values));  // a short series
+  values.resize(ColumnPool::kLongSeries + 1, -0.125);
+  const int index = pool.AddSeries(values);
+  const Config columns = pool.Columns();
+  const Node column = columns.root().At("columns").Items().at(static_cast<std::size_t>(index));
+  EXPECT_EQ(column.At("d").Text(), "l2");
+  const std::vector<std::uint16_t> codes = ValuesOf<std::uint16_t>(column);
+  EXPECT_EQ(codes[0], 0);
+  EXPECT_EQ(codes[1], 32767);
+  EXPECT_EQ(codes[2], 32766);
+  EXPECT_EQ(codes[3], 32766 | 0x8000);
+  for (std::size_t i = 4; i < values.size(); i += 1000) {
+    const double level = codes[i] & 0x7FFF;
+    const double magnitude =
+        std::exp2(column.At("v").Number() + column.At("s").Number() * (level - 1.0));
+    EXPECT_NEAR(magnitude, std::abs(values[i]), 1e-3 * std::abs(values[i])) << i;
+    EXPECT_EQ((codes[i] & 0x8000) != 0, values[i] < 0.0) << i;
+  }
+}
+
 }  // namespace
 }  // namespace alidade::internal

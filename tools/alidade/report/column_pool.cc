@@ -98,6 +98,31 @@ int ColumnPool::AddNumbers(std::span<const double> values) {
   return Add(Binary("f4", floats, has_offset ? Json::object({{"o", offset}}) : Json::object()));
 }
 
+int ColumnPool::AddSeries(std::span<const double> values) {
+  constexpr std::uint16_t kNegative = 0x8000, kLargest = 32765, kInfinite = 32766, kMissing = 32767;
+  if (values.size() <= kLongSeries) return AddNumbers(values);
+  double least = std::numeric_limits<double>::infinity(), greatest = 0.0;
+  for (const double value : values) {
+    const double magnitude = std::abs(value);
+    if (!std::isfinite(value) || magnitude == 0.0) continue;
+    least = std::min(least, magnitude);
+    greatest = std::max(greatest, magnitude);
+  }
+  if (!(greatest > least)) return AddNumbers(values);
+  const double start = std::log2(least), step = (std::log2(greatest) - start) / (kLargest - 1);
+  const auto code = [&](double value) -> std::uint16_t {
+    if (std::isnan(value)) return kMissing;
+    if (value == 0.0) return 0;
+    const double level = std::isinf(value)
+                             ? kInfinite
+                             : 1.0 + std::round((std::log2(std::abs(value)) - start) / step);
+    return static_cast<std::uint16_t>(level) | (value < 0.0 ? kNegative : 0U);
+  };
+  std::vector<std::uint16_t> codes(values.size());
+  std::ranges::transform(values, codes.begin(), code);
+  return Add(Binary("l2", codes, {{"v", start}, {"s", step}}));
+}
+
 int ColumnPool::AddCloud(std::span<const double> values, double resolution) {
   constexpr double kSteps = 32000.0;
   constexpr std::int16_t kMissing = -32768;

@@ -19,6 +19,11 @@ class ColumnPool {
   /// Adds numbers with the precision of a float. Values far from zero relative to their range are
   /// stored as differences from an offset.
   int AddNumbers(std::span<const double> values);
+  /// Adds numbers for a figure. More than kLongSeries numbers have 16 bits: their sign, and the
+  /// logarithm of their magnitude. The relative error is then at most 0.2 %, if the magnitudes
+  /// differ by a factor of at most 1e40.
+  int AddSeries(std::span<const double> values);
+  static constexpr std::size_t kLongSeries = 20'000;
   /// Adds numbers with 16 bits, for clouds of points. `resolution` is the smallest step between
   /// stored values.
   int AddCloud(std::span<const double> values, double resolution = 0.0);

@@ -52,7 +52,7 @@ Json AddColumns(const CsvColumns& table, const BlockColumns& columns, ColumnPool
   Json list = Json::array();
   for (const std::string& name : columns.names) {
     const std::vector<double> numbers = table.Numbers(name);
-    if (IsKnown(numbers)) list.push_back(pool.AddNumbers(numbers));
+    if (IsKnown(numbers)) list.push_back(pool.AddSeries(numbers));
   }
   return list;
 }
@@ -228,7 +228,7 @@ void AddPose(const EstimatorTables& tables, Json& data, ColumnPool& pool) {
 }  // namespace
 
 Json EstimatorData(const EstimatorTables& tables, const Json& columns, const Json& gate,
-                   const RunTimes& times, ColumnPool& pool) {
+                   bool has_measurements, const RunTimes& times, ColumnPool& pool) {
   Json data = {{"name", tables.name}};
   for (const char* key : {"type", "kind", "smoothed", "failed", "sensors", "metrics", "counts",
                           "verdict", "diagnosis", "unobservable", "overrides"}) {
@@ -245,7 +245,7 @@ Json EstimatorData(const EstimatorTables& tables, const Json& columns, const Jso
     data["last_p"] = FinalCovarianceData(tables.final_covariance, pool);
   }
   AddPose(tables, data, pool);
-  data["innovations"] = InnovationData(tables, times, pool);
+  data["innovations"] = InnovationData(tables, has_measurements, times, pool);
   data["gains"] = GainData(tables, times, pool);
   const Json landmarks = LandmarkData(tables.landmarks, times, pool);
   if (!landmarks.is_null()) data["landmarks"] = landmarks;

@@ -46,7 +46,7 @@ std::vector<std::uint32_t> LandmarkIds(const SensorRows& sensor) {
 /// Adds the elements `letter`0 to `letter`(size - 1) of each row.
 Json Elements(const SensorRows& sensor, const char* letter, std::size_t size, ColumnPool& pool) {
   Json list = Json::array();
-  for (std::size_t i = 0; i < size; ++i) list.push_back(pool.AddNumbers(sensor.Numbers(letter, i)));
+  for (std::size_t i = 0; i < size; ++i) list.push_back(pool.AddSeries(sensor.Numbers(letter, i)));
   return list;
 }
 
@@ -76,7 +76,7 @@ std::string CommonUnit(const Json& description) {
 }
 
 Json SensorData(const std::string& name, const Json& description, const SensorRows& sensor,
-                const RunTimes& times, ColumnPool& pool) {
+                bool has_measurements, const RunTimes& times, ColumnPool& pool) {
   constexpr std::size_t kMaxExactRows = 500;  // of a sensor of landmarks
   const std::size_t dof = description.at("z_index").size();
   const std::size_t ambient = description.at("units").size();
@@ -86,7 +86,7 @@ Json SensorData(const std::string& name, const Json& description, const SensorRo
                {"unit", CommonUnit(description)},
                {"t", times.ColumnOf(Select(sensor.table.Times(), sensor.rows))},
                {"outcome", pool.AddIntegers(OutcomeCodes(sensor))},
-               {"nis", pool.AddNumbers(sensor.Numbers("nis"))}};
+               {"nis", pool.AddSeries(sensor.Numbers("nis"))}};
   const std::vector<std::uint32_t> ids = LandmarkIds(sensor);
   if (!ids.empty()) data["landmark"] = pool.AddIntegers(ids);
   if (!ids.empty() && sensor.rows.size() > kMaxExactRows) {
@@ -95,22 +95,32 @@ Json SensorData(const std::string& name, const Json& description, const SensorRo
   }
   data["r"] = Elements(sensor, "r", dof, pool);
   data["s"] = Elements(sensor, "s", dof, pool);
-  if (ids.empty() && dof <= 3) {
+  if (has_measurements && ids.empty() && dof <= 3) {
     data["z"] = Elements(sensor, "z", ambient, pool);
     data["h"] = Elements(sensor, "h", ambient, pool);
   }
   return data;
 }
 
+/// Returns at most 5000 of the rows, equally spaced.
+std::vector<std::uint32_t> Thinned(const std::vector<std::uint32_t>& rows) {
+  constexpr std::size_t kMaxRows = 5000;
+  const std::size_t stride = rows.size() / kMaxRows + 1;
+  std::vector<std::uint32_t> thinned;
+  for (std::size_t i = 0; i < rows.size(); i += stride) thinned.push_back(rows[i]);
+  return thinned;
+}
+
 }  // namespace
 
-Json InnovationData(const EstimatorTables& tables, const RunTimes& times, ColumnPool& pool) {
+Json InnovationData(const EstimatorTables& tables, bool has_measurements, const RunTimes& times,
+                    ColumnPool& pool) {
   Json list = Json::array();
   if (!tables.entry.contains("innovations")) return list;
   for (const auto& [name, description] : tables.entry.at("innovations").items()) {
     const SensorRows sensor{tables.innovations, RowsWith(tables.innovations, "sensor", name)};
     if (sensor.rows.empty()) continue;
-    list.push_back(SensorData(name, description, sensor, times, pool));
+    list.push_back(SensorData(name, description, sensor, has_measurements, times, pool));
   }
   return list;
 }
@@ -119,7 +129,7 @@ Json GainData(const EstimatorTables& tables, const RunTimes& times, ColumnPool& 
   constexpr std::size_t kMaxGains = 24;  // more would not be readable
   Json list = Json::array();
   for (const std::string& sensor : DistinctTexts(tables.gains, "sensor")) {
-    const std::vector<std::uint32_t> rows = RowsWith(tables.gains, "sensor", sensor);
+    const std::vector<std::uint32_t> rows = Thinned(RowsWith(tables.gains, "sensor", sensor));
     Json columns = Json::array();
     for (const std::string_view name : tables.gains.names()) {
       if (name.find("<-") == name.npos) continue;

@@ -5,9 +5,11 @@
 
 namespace alidade::internal {
 
-/// Returns the list of the innovations of each sensor of an estimator, for the data of a page.
-Json InnovationData(const EstimatorTables& tables, const RunTimes& times, ColumnPool& pool);
-/// Returns the list of the gains of each sensor.
+/// Returns the list of the innovations of each sensor of an estimator, for the data of a page. If
+/// `has_measurements` is true, the list also contains measurements and their predictions.
+Json InnovationData(const EstimatorTables& tables, bool has_measurements, const RunTimes& times,
+                    ColumnPool& pool);
+/// Returns the list of the gains of each sensor, with at most 5000 rows for each sensor.
 Json GainData(const EstimatorTables& tables, const RunTimes& times, ColumnPool& pool);
 
 }  // namespace alidade::internal

@@ -142,6 +142,8 @@ Json RunData(const fs::path& folder, const Json& run, const Node& config, Column
   if (timestamps.empty() || estimators.empty()) return {};
   const RunTimes times(std::move(timestamps), pool);
   const Json columns = ReadJsonFile(folder / "columns.json");
+  // The page of an incomplete run shows the measurements of the last frames.
+  const bool is_complete = run.value("status", "ok") == "ok";
   Json data = {{"t", times.column()},
                {"t0", Seconds(times.origin())},
                {"outcomes", OutcomeList()},
@@ -150,7 +152,8 @@ Json RunData(const fs::path& folder, const Json& run, const Node& config, Column
                {"segments", SegmentData(config, estimators, times)}};
   Json& list = data["estimators"] = Json::array();
   for (const EstimatorTables& tables : estimators) {
-    list.push_back(EstimatorData(tables, columns, GateOf(config, tables.name), times, pool));
+    const Json gate = GateOf(config, tables.name);
+    list.push_back(EstimatorData(tables, columns, gate, !is_complete, times, pool));
   }
   return data;
 }

@@ -15,6 +15,15 @@ function bytes(base64) {
   return out.buffer;
 }
 
+/** A number of a long series: its sign, and the logarithm of its magnitude. */
+function numberOfCode(code, {v: start, s: step}) {
+  const level = code & 0x7fff;
+  const sign = code & 0x8000 ? -1 : 1;
+  if (level === 0) return 0;
+  if (level === 32767) return NaN;
+  return level === 32766 ? sign * Infinity : sign * 2 ** (start + step * (level - 1));
+}
+
 function decode(c) {
   switch (c.d) {
     case 'lin':
@@ -33,6 +42,8 @@ function decode(c) {
       return new Uint16Array(bytes(c.b));
     case 'u4':
       return new Uint32Array(bytes(c.b));
+    case 'l2':
+      return Float32Array.from(new Uint16Array(bytes(c.b)), (code) => numberOfCode(code, c));
     case 'i2':
       return Float32Array.from(new Int16Array(bytes(c.b)), (v) => (v === -32768 ? NaN : v * c.s));
     case 'f4': {

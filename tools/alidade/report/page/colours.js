@@ -47,3 +47,20 @@ function setTheme(dark) {
   ).join('\n');
   redraw();
 }
+
+/** Colours of a quantity from small to large. */
+const RAMP = [
+  [31, 111, 180],
+  [106, 160, 200],
+  [185, 180, 168],
+  [232, 160, 76],
+  [209, 68, 12],
+];
+
+/** The colour of a share from 0 to 1. */
+function ramp(share) {
+  const place = clamp(share, 0, 1) * (RAMP.length - 1);
+  const i = Math.min(RAMP.length - 2, Math.floor(place));
+  const mixed = RAMP[i].map((v, k) => Math.round(v + (place - i) * (RAMP[i + 1][k] - v)));
+  return `rgb(${mixed.join(',')})`;
+}

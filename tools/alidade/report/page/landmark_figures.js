@@ -53,7 +53,7 @@ function landmarkErrorFigure(box) {
       name: e.name,
       size: 3.2,
       alpha: 0.75,
-      tip: (i) => landmarkTip(map, i),
+      tip: (i) => landmarkTip({map, i}),
     };
   });
   figure(box, {

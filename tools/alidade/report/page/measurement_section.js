@@ -101,7 +101,8 @@ function paintLane(surface, X, plot, lane, y) {
 
 /** Landmarks of each frame, and the rms of their innovations, for each sensor of landmarks. */
 function landmarkCountFigure(box, lanes) {
-  const maps = lanes.filter(({I}) => I.landmark !== undefined && I.dof);
+  const hasFrames = (I) => I.landmark !== undefined && I.dof && framesOf(I).t.length > 1;
+  const maps = lanes.filter(({I}) => hasFrames(I));
   const sensors = unique(maps.map(({I}) => I.sensor));
   if (!sensors.length) return;
   const plots = sensors.flatMap((sensor, i) => {

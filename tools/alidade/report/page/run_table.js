@@ -1,136 +1,130 @@
 // SPDX-License-Identifier: Apache-2.0
-// Table of the estimators, and all metrics.
+// Table of the estimators of a run, and all metrics.
 
-function runTable() {
-  const es = RUN.estimators;
-  const blocks = [];
-  for (const e of es)
-    for (const b of e.blocks)
-      if (e.metrics['rmse:' + b.name] !== undefined && !blocks.some((q) => q.name === b.name))
-        blocks.push({name: b.name, unit: b.error_unit});
-  const cols = [
-    {name: 'estimator', text: true, get: (e) => e.name, show: (e) => nameOf(e.name)},
-    {
-      name: 'verdict',
-      text: true,
-      get: (e) => verdictOf(e).state,
-      show: (e) => {
-        const {cls, mark, state, because} = verdictOf(e);
-        return element('span', {class: cls, title: because}, `${mark} ${state}`);
-      },
-    },
-  ];
-  for (const b of blocks) {
-    const v = es.map((e) => e.metrics['rmse:' + b.name]).filter((x) => x > 0);
-    const [f, u] = unitFor(b.unit, v.length ? Math.min(...v) : 1);
-    cols.push({
-      name: b.name.split('.').pop().replace(/_/g, ' '),
-      sub: `RMSE${u ? ` [${u}]` : ''}`,
-      title: b.name,
-      best: 'min',
-      get: (e) =>
-        ((x) => (x === undefined || x === null ? NaN : x * f))(e.metrics['rmse:' + b.name]),
-    });
-  }
-  for (const kind of ['nees', 'nis'])
-    for (const s of unique(
-      es.flatMap((e) =>
-        Object.keys(e.metrics)
-          .filter((k) => k.startsWith(kind + '.mean:') && !k.includes('@'))
-          .map((k) => k.slice(kind.length + 6)),
-      ),
-    ))
-      cols.push({
-        name: kind.toUpperCase() + ' ' + s,
-        sub: '1 is ideal',
-        title:
-          kind === 'nees'
-            ? 'mean squared error by its covariance'
-            : 'mean squared innovation by its covariance',
-        get: (e) => e.metrics[`${kind}.mean:${s}`],
-        show: (e) =>
-          note(
-            s,
-            e.metrics[`${kind}.mean:${s}`],
-            e.metrics[`${kind}.low:${s}`],
-            e.metrics[`${kind}.high:${s}`],
-          ),
-      });
-  cols.splice(2, 0, {
+/** Sum of the counts whose key has this name. */
+const countOf = (e, name) =>
+  sum(Object.entries(e.counts).map(([key, n]) => (key.startsWith(name + ':') ? n : 0)));
+
+const usedColumn = () => {
+  const totalOf = (e) =>
+    countOf(e, 'accepted') + sum(e.sensors.map((sensor) => rejectedCount(e, sensor)));
+  return {
     name: 'used / given',
     sub: 'measurements',
-    get: (e) =>
-      sum(
-        Object.entries(e.counts)
-          .filter(([k]) => /^accepted:/.test(k))
-          .map((q) => q[1]),
-      ),
+    get: (e) => countOf(e, 'accepted'),
     show: (e) => {
-      const c = (re) =>
-        sum(
-          Object.entries(e.counts)
-            .filter(([k]) => re.test(k))
-            .map((q) => q[1]),
-        );
-      const a = c(/^accepted:/);
-      const n = a + sum(e.sensors.map((sensor) => rejectedCount(e, sensor)));
-      return element('span', {class: a < 0.9 * n ? 'warn' : ''}, `${count(a)} / ${count(n)}`);
+      const used = countOf(e, 'accepted');
+      const total = totalOf(e);
+      const cls = used < 0.9 * total ? 'warn' : '';
+      return element('span', {class: cls}, `${count(used)} / ${count(total)}`);
     },
+  };
+};
+
+const verdictColumn = () => ({
+  name: 'verdict',
+  text: true,
+  get: (e) => verdictOf(e).state,
+  show: (e) => {
+    const {cls, mark, state, because} = verdictOf(e);
+    return element('span', {class: cls, title: because}, `${mark} ${state}`);
+  },
+});
+
+/** A column for the RMSE of each block. */
+function errorColumns() {
+  const units = new Map();
+  for (const {blocks, metrics} of RUN.estimators)
+    for (const {name, error_unit: unit} of blocks)
+      if (metrics['rmse:' + name] !== undefined && !units.has(name)) units.set(name, unit);
+  return [...units].map(([block, unit]) => {
+    const errorOf = (e) => e.metrics['rmse:' + block] ?? NaN;
+    const positive = RUN.estimators.map(errorOf).filter((v) => v > 0);
+    const [factor, label] = unitFor(unit, positive.length ? Math.min(...positive) : 1);
+    return {
+      name: shortName(block),
+      sub: `RMSE${label ? ` [${label}]` : ''}`,
+      title: block,
+      best: 'min',
+      get: (e) => errorOf(e) * factor,
+    };
   });
-  const t = dataTable(cols, es, {off: (e) => page.hidden.has(e.name)});
-  page.listeners.push(() => t.refill());
-  return t;
+}
+
+const RATIO_TITLES = {
+  nees: 'mean squared error, divided by its covariance',
+  nis: 'mean squared innovation, divided by its covariance',
+};
+
+/** A column for the mean NEES of each owner, or the mean NIS of each sensor. */
+function ratioColumns(kind) {
+  const prefix = `${kind}.mean:`;
+  const keys = unique(RUN.estimators.flatMap((e) => Object.keys(e.metrics)));
+  const subjects = keys
+    .filter((key) => key.startsWith(prefix) && !key.includes('@'))
+    .map((key) => key.slice(prefix.length));
+  return subjects.map((subject) => ({
+    name: `${kind.toUpperCase()} ${subject}`,
+    sub: '1 is ideal',
+    title: RATIO_TITLES[kind],
+    get: (e) => e.metrics[prefix + subject],
+    show: ({metrics}) => {
+      const bounds = ['low', 'high'].map((end) => metrics[`${kind}.${end}:${subject}`]);
+      return note(subject, metrics[prefix + subject], ...bounds);
+    },
+  }));
+}
+
+function runTable() {
+  const columns = [
+    {name: 'estimator', text: true, get: (e) => e.name, show: (e) => nameOf(e.name)},
+    verdictColumn(),
+    usedColumn(),
+    ...errorColumns(),
+    ...ratioColumns('nees'),
+    ...ratioColumns('nis'),
+  ];
+  const table = dataTable(columns, RUN.estimators, {off: (e) => page.hidden.has(e.name)});
+  page.listeners.push(() => table.refill());
+  return table;
+}
+
+/** The text of a metric or a count of run.json. */
+function metricText(value) {
+  if (typeof value === 'boolean') return value ? 'yes' : 'no';
+  if (value === undefined) return '–';
+  return value === null ? '∞' : numberText(value, 4);
+}
+
+/** All metrics and counts whose key contains `filter`. */
+function metricTable(filter) {
+  const keysOf = (get) => unique(RUN.estimators.flatMap((e) => Object.keys(get(e))));
+  const rowsOf = (get) => keysOf(get).map((key) => ({key, valueOf: (e) => get(e)[key]}));
+  const rows = [...rowsOf((e) => e.metrics), ...rowsOf((e) => e.counts)];
+  const columns = RUN.estimators.map((e) => ({
+    name: e.name,
+    get: (row) => Number(row.valueOf(e) ?? NaN),
+    show: (row) => metricText(row.valueOf(e)),
+  }));
+  return dataTable(
+    [{name: 'metric', text: true, get: (row) => row.key}, ...columns],
+    rows.filter(({key}) => key.includes(filter)),
+    {tall: true},
+  );
 }
 
 function metricFold(parent) {
   fold(parent, 'All metrics', 'every number of run.json', (box) => {
-    const keys = unique(RUN.estimators.flatMap((e) => Object.keys(e.metrics)));
-    const cs = unique(RUN.estimators.flatMap((e) => Object.keys(e.counts)));
     const holder = element('div');
-    const rows = [
-      ...keys.map((k) => ({k, of: (e) => e.metrics[k]})),
-      ...cs.map((k) => ({k, of: (e) => e.counts[k]})),
-    ];
-    const cell = (v) =>
-      typeof v === 'boolean'
-        ? v
-          ? 'yes'
-          : 'no'
-        : v === undefined
-          ? '–'
-          : v === null
-            ? '∞'
-            : numberText(v, 4);
-    const show = (q) =>
-      setContent(
-        holder,
-        dataTable(
-          [
-            {name: 'metric', text: true, get: (r) => r.k},
-            ...RUN.estimators.map((e) => ({
-              name: e.name,
-              get: (r) => (r.of(e) === undefined ? NaN : Number(r.of(e))),
-              show: (r) => cell(r.of(e)),
-            })),
-          ],
-          rows.filter((r) => r.k.includes(q)),
-          {tall: true},
-        ),
-      );
-    box.append(
-      element(
-        'div',
-        {class: 'panel'},
-        element('input', {
-          class: 'search',
-          placeholder: 'filter, e.g. nees or @blind',
-          'aria-label': 'filter metrics',
-          oninput: (e) => show(e.target.value),
-        }),
-        element('p', {class: 'quiet', style: 'margin:4px 0 8px'}, 'SI units, as in run.json.'),
-        holder,
-      ),
-    );
+    const show = (filter) => setContent(holder, metricTable(filter));
+    const input = element('input', {
+      class: 'search',
+      placeholder: 'filter, e.g. nees or @blind',
+      'aria-label': 'filter metrics',
+      oninput: (event) => show(event.target.value),
+    });
+    const text = element('p', {class: 'quiet'}, 'SI units, as in run.json.');
+    box.append(element('div', {class: 'panel'}, input, text, holder));
     show('');
   });
 }
@@ -139,16 +133,10 @@ function metricFold(parent) {
 function runTablePanel() {
   const table = runTable();
   const legend = 'Bold: best of its column. ▲ above, ▼ below its 95 % bounds.';
-  return element(
-    'div',
-    {class: 'panel'},
-    table,
-    element(
-      'p',
-      {class: 'side', style: 'margin:8px 0 0'},
-      element('span', {class: 'quiet'}, legend),
-      copyButton(() => table.copy(false), 'copy as Markdown'),
-      copyButton(() => table.copy(true), 'copy as LaTeX'),
-    ),
-  );
+  const buttons = [
+    copyButton(() => table.copy(false), 'copy as Markdown'),
+    copyButton(() => table.copy(true), 'copy as LaTeX'),
+  ];
+  const foot = element('p', {class: 'side'}, element('span', {class: 'quiet'}, legend), buttons);
+  return element('div', {class: 'panel'}, table, foot);
 }

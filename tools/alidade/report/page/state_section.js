@@ -1,217 +1,176 @@
 // SPDX-License-Identifier: Apache-2.0
 // Section "Estimates and errors".
 
-/** Series of each element of a block; those of a quaternion are roll, pitch and yaw. */
-const seriesMemo = new Map();
+const elementMemo = new Map();
 
-function series(e, b) {
-  const key = e.name + '/' + b.name;
-  if (seriesMemo.has(key)) return seriesMemo.get(key);
-  const quat = b.geometry === 'unit_quaternion';
-  const value = quat ? rollPitchYaw(b.value.map(columnOf)) : b.value.map(columnOf);
-  const sigma = b.sigma.map(columnOf);
-  const error = b.error.map(columnOf);
-  const out = [];
-  let truth = b.elements.map((k) => truthOf(b, k));
-  if (quat && truth[0]) truth = rollPitchYaw(truth);
-  value.forEach((v, k) =>
-    out.push({
-      label: quat ? ['roll', 'pitch', 'yaw'][k] : b.elements[k],
-      unit: quat ? 'rad' : b.unit,
-      value: v,
-      truth: truth[k],
-      bandless: quat,
-      sigma: sigma[k],
-    }),
-  );
-  const es = error.map((x, k) => ({
-    label: b.tangent[k] || '',
-    unit: b.error_unit,
-    error: x,
-    sigma: sigma[k],
-  }));
-  seriesMemo.set(key, {value: out, error: es});
-  return seriesMemo.get(key);
+/**
+ * Elements of a block of an estimator: {values, errors}, lists of {label, unit, y, sigma, truth}.
+ * The values of a quaternion are roll, pitch and yaw; they have no band.
+ */
+function elementsOf(e, block) {
+  const key = e.name + '/' + block.name;
+  if (!elementMemo.has(key)) elementMemo.set(key, computeElements(block));
+  return elementMemo.get(key);
 }
 
-function statePlots(block, what) {
-  const es = RUN.estimators.filter((e) => e.blocks.some((b) => b.name === block));
-  const first = es[0];
-  const b0 = first.blocks.find((b) => b.name === block);
-  const of = (e) =>
-    series(
-      e,
-      e.blocks.find((b) => b.name === block),
-    );
-  const short = block.split('.').pop().replace(/_/g, ' ');
-  const ps = [];
-  const withError = es.find((e) => of(e).error.length);
-  const add = (label, unit, zero, layers) =>
-    ps.push({
+function computeElements(block) {
+  const isQuaternion = block.geometry === 'unit_quaternion';
+  const sigma = block.sigma.map(columnOf);
+  const truth = block.elements.map((name) => truthOf(block, name));
+  const value = block.value.map(columnOf);
+  const errors = block.error.map((ref, k) => ({
+    label: block.tangent[k] || '',
+    unit: block.error_unit,
+    y: columnOf(ref),
+    sigma: sigma[k],
+  }));
+  if (!isQuaternion) {
+    const valueOf = (y, k) => {
+      const label = block.elements[k];
+      return {label, unit: block.unit, y, sigma: sigma[k], truth: truth[k]};
+    };
+    return {values: value.map(valueOf), errors};
+  }
+  const angles = rollPitchYaw(value);
+  const trueAngles = truth[0] ? rollPitchYaw(truth) : [];
+  const angleOf = (label, k) => ({label, unit: 'rad', y: angles[k], truth: trueAngles[k]});
+  return {values: ['roll', 'pitch', 'yaw'].map(angleOf), errors};
+}
+
+/** The estimators that have a block: [{e, block, elements}]. */
+const usersOf = (name) =>
+  RUN.estimators
+    .map((e) => ({e, block: e.blocks.find((b) => b.name === name)}))
+    .filter(({block}) => block)
+    .map((user) => ({...user, elements: elementsOf(user.e, user.block)}));
+
+/** Layers of element k: estimates with their bands, implied states and truth. */
+function valueLayers(users, k) {
+  const name = users[0].block.name;
+  const series = users.map(({e, elements}) => ({e, ...elements.values[k]}));
+  const bands = series
+    .filter(({sigma}) => sigma)
+    .map(({e, y, sigma}) => {
+      const x = columnOf(e.t);
+      return {kind: 'band', x, c: y, s: sigma, m: 3, est: e.name, fill: 0.09};
+    });
+  const implied = RUN.implied
+    .filter(({block}) => block === name)
+    .map(({sensor, t, v}) => ({
+      kind: 'dots',
+      x: columnOf(t),
+      y: columnOf(v),
+      color: () => colours.faint,
+      size: 1.2,
+      alpha: 0.75,
+      fit: false,
+      name: sensor,
+    }));
+  const lines = series.map(({e, y, sigma}) => {
+    const x = columnOf(e.t);
+    return {kind: 'line', x, y, s: sigma, est: e.name, name: e.name};
+  });
+  const {truth} = users[0].elements.values[k];
+  const style = {ref: true, color: ink, dash: [6, 4], width: 1.4, name: 'truth'};
+  const trueLine = truth && {kind: 'line', x: columnOf(RUN.t), y: truth, ...style};
+  return [...bands, ...implied, ...lines, trueLine];
+}
+
+/** Layers of the error of element k, with their bands. */
+function errorLayers(users, k) {
+  return users
+    .filter(({elements}) => elements.errors[k])
+    .flatMap(({e, elements}) => {
+      const {y, sigma} = elements.errors[k];
+      const x = columnOf(e.t);
+      const band = {kind: 'band', x, s: sigma, m: 3, est: e.name, fill: 0.05, edge: true};
+      return [sigma && band, {kind: 'line', x, y, s: sigma, est: e.name, name: e.name}];
+    });
+}
+
+/** Plots of a block. `what` is value, error or both. */
+function statePlots(name, what) {
+  const users = usersOf(name);
+  const judged = users.find(({elements}) => elements.errors.length);
+  const isScalar = users[0].block.value.length === 1;
+  const specs = [];
+  const add = (label, unit, isError, layers) =>
+    specs.push({
       label,
       name: label + ' over time',
       time: true,
       last: false,
-      height: first.blocks.find((b) => b.name === block).value.length > 1 ? 128 : zero ? 190 : 240,
-      zero,
-      first: !ps.length,
+      first: !specs.length,
+      height: isScalar ? (isError ? 190 : 240) : 128,
+      zero: isError,
       y: {unit},
       layers,
     });
-  if (what !== 'error' || !withError)
-    of(first).value.forEach((q, k) =>
-      add(`${short} ${q.label}`.trim(), q.unit, false, () => [
-        ...es.map((e) => {
-          const s = of(e).value[k];
-          const t = columnOf(e.t);
-          return (
-            s.sigma &&
-            !s.bandless && {
-              kind: 'band',
-              x: t,
-              c: s.value,
-              s: s.sigma,
-              m: 3,
-              est: e.name,
-              fill: 0.09,
-            }
-          );
-        }),
-        ...RUN.implied
-          .filter((i) => i.block === block && what !== 'value-only')
-          .map((i) => ({
-            kind: 'dots',
-            x: columnOf(i.t),
-            y: columnOf(i.v),
-            color: () => colours.faint,
-            size: 1.2,
-            alpha: 0.75,
-            fit: false,
-            name: i.sensor,
-          })),
-        ...es.map((e) => ({
-          kind: 'line',
-          x: columnOf(e.t),
-          y: of(e).value[k].value,
-          s: of(e).value[k].bandless ? null : of(e).value[k].sigma,
-          est: e.name,
-          name: e.name,
-        })),
-        q.truth && {
-          kind: 'line',
-          x: columnOf(RUN.t),
-          y: q.truth,
-          ref: true,
-          color: ink,
-          dash: [6, 4],
-          width: 1.4,
-          name: 'truth',
-        },
-      ]),
+  if (what !== 'error' || !judged)
+    users[0].elements.values.forEach(({label, unit}, k) =>
+      add(`${shortName(name)} ${label}`.trim(), unit, false, () => valueLayers(users, k)),
     );
-  if (what !== 'value' && withError)
-    of(withError).error.forEach((q, k) =>
-      add(`error of ${short} ${q.label}`.trim(), q.unit, true, () =>
-        es
-          .filter((e) => of(e).error[k])
-          .flatMap((e) => {
-            const s = of(e).error[k];
-            const t = columnOf(e.t);
-            return [
-              s.sigma && {
-                kind: 'band',
-                x: t,
-                s: s.sigma,
-                m: 3,
-                est: e.name,
-                fill: 0.05,
-                edge: true,
-              },
-              {kind: 'line', x: t, y: s.error, s: s.sigma, est: e.name, name: e.name},
-            ];
-          }),
-      ),
-    );
-  ps[ps.length - 1].last = true;
-  ps[ps.length - 1].height += 28;
-  return ps.map((s) => new Plot(s));
+  if (what !== 'value' && judged)
+    judged.elements.errors.forEach(({label, unit}, k) => {
+      const title = `error of ${shortName(name)} ${label}`.trim();
+      add(title, unit, true, () => errorLayers(users, k));
+    });
+  const last = specs[specs.length - 1];
+  last.last = true;
+  last.height += 28;
+  return specs.map((spec) => new Plot(spec));
+}
+
+function stateHint({name, error, sigma}, what) {
+  const isError = what !== 'value' && error.length;
+  const isImplied = RUN.implied.some(({block}) => block === name);
+  const dots = isImplied ? ', grey dots are the states that single measurements imply' : '';
+  const values = `Lines are estimates, bands ±3σ, the dashed line is truth${dots}. `;
+  const band = sigma.length ? ', inside their 3σ band in all but 0.3 % of the frames' : '';
+  const errors = `Errors are estimate minus truth and should look like noise${band}.`;
+  return (what !== 'error' || !isError ? values : '') + (isError ? errors : '');
+}
+
+/** The blocks with errors or standard deviations. Of the same blocks, one with errors. */
+function shownBlocks() {
+  const blocks = new Map();
+  for (const block of RUN.estimators.flatMap((e) => e.blocks)) {
+    const known = blocks.get(block.name);
+    if (!known || (block.error.length && !known.error.length)) blocks.set(block.name, block);
+  }
+  return [...blocks.values()].filter((block) => block.error.length || block.sigma.length);
 }
 
 function stateSection(main) {
-  const box = element('div');
-  const blocks = [];
-  for (const e of RUN.estimators)
-    for (const b of e.blocks)
-      if (!blocks.some((q) => q.name === b.name)) blocks.push(b);
-      else if (b.error.length) {
-        const q = blocks.find((x) => x.name === b.name);
-        if (!q.error.length) blocks[blocks.indexOf(q)] = b;
-      }
-  const usable = blocks.filter((b) => b.error.length || b.sigma.length);
-  if (!usable.length) return;
-  const s = section(
-    'state',
-    'Estimates and errors',
-    'drag to zoom, double-click for all, click to keep the cursor',
-    main,
-  );
-  const start = usable.find((b) => b.error.length) || usable[0];
-  let block = start;
-  let what =
-    start.size > 1 || start.value.length > 1 ? (start.error.length ? 'error' : 'value') : 'both';
-  let now = [];
+  const blocks = shownBlocks();
+  if (!blocks.length) return;
+  const subtitle = 'drag to zoom, double-click for all, click to keep the cursor';
+  const box = section('state', 'Estimates and errors', subtitle, main);
+  const holder = element('div');
+  let block = blocks.find((b) => b.error.length) || blocks[0];
+  let what = block.value.length === 1 ? 'both' : block.error.length ? 'error' : 'value';
+  let plots = [];
   const build = () => {
-    dispose(now);
-    now = statePlots(block.name, what);
-    const isError = what !== 'value' && block.error.length;
-    setContent(box);
-    figure(box, {
-      title: block.name.replace('.', ' · ').replace(/_/g, ' '),
-      plots: now,
-      hint:
-        (what !== 'error' || !isError
-          ? 'Lines are estimates, bands ±3σ, the dashed line is truth' +
-            (RUN.implied.some((i) => i.block === block.name)
-              ? ', grey dots are what single measurements imply'
-              : '') +
-            '. '
-          : '') +
-        (isError
-          ? 'Errors are estimate minus truth and should look like noise' +
-            (block.sigma.length
-              ? ', inside their 3σ band in all but 0.3 % of the frames.'
-              : '.')
-          : ''),
-    });
+    dispose(plots);
+    plots = statePlots(block.name, what);
+    setContent(holder);
+    const title = block.name.replace('.', ' · ').replace(/_/g, ' ');
+    figure(holder, {title, plots, hint: stateHint(block, what)});
   };
-  s.append(
-    element(
-      'div',
-      {class: 'side'},
-      choice(
-        '',
-        usable.map((b) => [b.name, b.name.split('.').pop().replace(/_/g, ' ')]),
-        start.name,
-        (v) => {
-          block = usable.find((b) => b.name === v);
-          build();
-        },
-      ),
-      choice(
-        'show',
-        [
-          ['both', 'both'],
-          ['error', 'error'],
-          ['value', 'estimate'],
-        ],
-        what,
-        (v) => {
-          what = v;
-          build();
-        },
-      ),
-    ),
-    box,
-  );
+  const names = blocks.map(({name}) => [name, shortName(name)]);
+  const blockChoice = choice('', names, block.name, (name) => {
+    block = blocks.find((b) => b.name === name);
+    build();
+  });
+  const contents = [
+    ['both', 'both'],
+    ['error', 'error'],
+    ['value', 'estimate'],
+  ];
+  const contentChoice = choice('show', contents, what, (value) => {
+    what = value;
+    build();
+  });
+  box.append(element('div', {class: 'side'}, blockChoice, contentChoice), holder);
   build();
 }

@@ -1,70 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
 // Timeline: the whole run on one line, with the visible time.
 
+const TIMELINE_MARGIN = 8;
+
 /** Segments, events and the visible window. A drag selects a window, a click moves it. */
 class Timeline {
   constructor() {
     this.spec = {label: 'timeline'};
     this.dirty = true;
     this.seen = true;
-    this.base = element('canvas', {
-      class: 'base',
-      style: 'position:absolute;width:100%;height:100%',
-    });
+    this.base = element('canvas', {class: 'base'});
     this.over = this.base;
-    this.el = element(
-      'div',
-      {class: 'timeline', title: 'drag: zoom all plots; click: go there; double-click: show all'},
-      this.base,
-    );
+    const title = 'drag: zoom all plots; click: go there; double-click: show all';
+    this.el = element('div', {class: 'timeline', title}, this.base);
     this.el.plot = this;
+    this.drag = null;
     plots.add(this);
     resizer.observe(this.el);
-    const T = (e) =>
-      page.full[0] +
-      clamp((e.clientX - this.base.getBoundingClientRect().left - 8) / (this.w - 16), 0, 1) *
-        (page.full[1] - page.full[0]);
-    this.base.addEventListener('pointerdown', (e) => {
-      this.base.setPointerCapture(e.pointerId);
-      this.from = this.to = T(e);
+    this.follow();
+  }
+
+  /** The time at the pointer. */
+  timeAt(event) {
+    const x = event.clientX - this.base.getBoundingClientRect().left - TIMELINE_MARGIN;
+    const share = clamp(x / (this.w - 2 * TIMELINE_MARGIN), 0, 1);
+    return page.full[0] + share * (page.full[1] - page.full[0]);
+  }
+
+  eventsAt(time) {
+    return eventsNear(time, ((page.full[1] - page.full[0]) * 6) / this.w);
+  }
+
+  follow() {
+    this.base.addEventListener('pointerdown', (event) => {
+      this.base.setPointerCapture(event.pointerId);
+      this.drag = [this.timeAt(event), this.timeAt(event)];
     });
-    this.base.addEventListener('pointermove', (e) => {
-      if (this.from !== undefined) {
-        this.to = T(e);
+    this.base.addEventListener('pointermove', (event) => {
+      const time = this.timeAt(event);
+      if (this.drag) {
+        this.drag[1] = time;
         this.draw();
         return;
       }
-      const t = T(e);
-      const ev = eventsNear(t, ((page.full[1] - page.full[0]) * 6) / this.w);
-      page.cursor = t;
+      page.cursor = time;
       cursorMoved();
-      if (ev.length)
-        showTip(
-          e,
-          ev
-            .slice(0, 5)
-            .map(([n, v]) =>
-              element(
-                'p',
-                {style: 'margin:0'},
-                nameOf(n),
-                ` ${clock(v[0])} s ${v[1].replace(/_/g, ' ')}: ${v[2]}`,
-              ),
-            ),
-        );
-      else hideTip();
+      this.showEvents(event, time);
     });
-    this.base.addEventListener('pointerup', () => {
-      const a = Math.min(this.from, this.to);
-      const b = Math.max(this.from, this.to);
-      this.from = undefined;
-      if (b - a > (page.full[1] - page.full[0]) * 0.005) {
-        zoomTo(a, b);
-        return;
-      }
-      const ev = eventsNear(a, ((page.full[1] - page.full[0]) * 6) / this.w);
-      goTo(ev.length ? ev[0][1][0] : a);
-    });
+    this.base.addEventListener('pointerup', () => this.endDrag());
     this.base.addEventListener('pointerleave', () => {
       hideTip();
       page.cursor = null;
@@ -72,50 +55,74 @@ class Timeline {
     });
     this.base.addEventListener('dblclick', () => zoomTo(...page.full));
   }
+
+  showEvents(event, time) {
+    const lines = this.eventsAt(time)
+      .slice(0, 5)
+      .map(([name, [at, kind, text]]) => {
+        const content = ` ${clock(at)} s ${kind.replace(/_/g, ' ')}: ${text}`;
+        return element('p', {class: 'event'}, nameOf(name), content);
+      });
+    if (lines.length) showTip(event, lines);
+    else hideTip();
+  }
+
+  endDrag() {
+    if (!this.drag) return;
+    const [from, to] = [Math.min(...this.drag), Math.max(...this.drag)];
+    this.drag = null;
+    if (to - from > (page.full[1] - page.full[0]) * 0.005) {
+      zoomTo(from, to);
+      return;
+    }
+    const [event] = this.eventsAt(from);
+    goTo(event ? event[1][0] : from);
+  }
+
   paintOver() {
     this.draw();
   }
+
   draw() {
-    const w = (this.w = this.el.clientWidth);
-    const hh = this.el.clientHeight;
-    const dpr = window.devicePixelRatio || 1;
-    const c = this.base;
-    if (!w) return;
-    if (c.width !== Math.round(w * dpr)) c.width = Math.round(w * dpr);
-    if (c.height !== Math.round(hh * dpr)) c.height = Math.round(hh * dpr);
-    const ctx = c.getContext('2d');
-    const X = (t) => 8 + ((t - page.full[0]) / (page.full[1] - page.full[0])) * (w - 16);
-    const s = new CanvasSurface(ctx);
-    ctx.setTransform(dpr, 0, 0, dpr, 0, 0);
-    ctx.clearRect(0, 0, w, hh);
+    this.w = this.el.clientWidth;
+    const height = this.el.clientHeight;
+    if (!this.w) return;
+    const ratio = window.devicePixelRatio || 1;
+    const size = [Math.round(this.w * ratio), Math.round(height * ratio)];
+    if (this.base.width !== size[0] || this.base.height !== size[1])
+      [this.base.width, this.base.height] = size;
+    const context = this.base.getContext('2d');
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, this.w, height);
     this.dirty = false;
-    s.rect(8, 3, w - 16, hh - 14, {fill: colours.grid});
-    if (RUN)
-      for (const g of shaded())
-        for (const [a, b] of g.spans) {
-          s.rect(X(a), 3, X(b) - X(a), hh - 14, {fill: colours.faint, alpha: 0.35});
-          if (X(b) - X(a) > 50)
-            s.text(g.name, (X(a) + X(b)) / 2, 3 + (hh - 14) / 2, {align: 'center', size: 10});
-        }
-    const win =
-      this.from !== undefined
-        ? [Math.min(this.from, this.to), Math.max(this.from, this.to)]
-        : page.x;
-    if (win[0] > page.full[0] || win[1] < page.full[1])
-      s.rect(X(win[0]), 2, X(win[1]) - X(win[0]), hh - 12, {
-        fill: colours.accent,
-        alpha: 0.22,
-        stroke: colours.accent,
-      });
-    if (RUN)
-      for (const e of RUN.estimators)
-        if (shown(e.name))
-          for (const [t] of e.events)
-            if (t !== null)
-              s.rect(X(t) - 1, 3, 2, hh - 14, {fill: colorOf(e.name), alpha: dim(e.name)});
-    const at = page.cursor === null ? page.time : page.cursor;
-    if (at !== null) s.rect(X(at) - 0.5, 0, 1, hh - 9, {fill: colours.ink});
-    s.text(clock(page.full[0]) + ' s', 8, hh - 4, {size: 9.5});
-    s.text(clock(page.full[1]) + ' s', w - 8, hh - 4, {size: 9.5, align: 'right'});
+    this.paint(new CanvasSurface(context), height);
+  }
+
+  paint(surface, height) {
+    const inner = this.w - 2 * TIMELINE_MARGIN;
+    const X = (t) =>
+      TIMELINE_MARGIN + ((t - page.full[0]) / (page.full[1] - page.full[0])) * inner;
+    surface.rect(TIMELINE_MARGIN, 3, inner, height - 14, {fill: colours.grid});
+    for (const {name, spans} of shaded())
+      for (const [from, to] of spans) {
+        const width = X(to) - X(from);
+        surface.rect(X(from), 3, width, height - 14, {fill: colours.faint, alpha: 0.35});
+        const style = {align: 'center', size: 10};
+        if (width > 50) surface.text(name, X(from) + width / 2, 3 + (height - 14) / 2, style);
+      }
+    const [from, to] = this.drag ? this.drag.slice().sort((a, b) => a - b) : page.x;
+    if (from > page.full[0] || to < page.full[1]) {
+      const style = {fill: colours.accent, alpha: 0.22, stroke: colours.accent};
+      surface.rect(X(from), 2, X(to) - X(from), height - 12, style);
+    }
+    for (const [name, [time]] of eventsNear()) {
+      const style = {fill: colorOf(name), alpha: dim(name)};
+      if (time !== null) surface.rect(X(time) - 1, 3, 2, height - 14, style);
+    }
+    const time = page.cursor ?? page.time;
+    if (time !== null) surface.rect(X(time) - 0.5, 0, 1, height - 9, {fill: colours.ink});
+    const right = {size: 9.5, align: 'right'};
+    surface.text(clock(page.full[0]) + ' s', TIMELINE_MARGIN, height - 4, {size: 9.5});
+    surface.text(clock(page.full[1]) + ' s', this.w - TIMELINE_MARGIN, height - 4, right);
   }
 }

@@ -118,7 +118,7 @@ class ReaderTest(Folders):
         folder = self.copy("damaged")
         with open(folder / "_ekf/errors.csv", "a") as file:
             file.write("9.9,0.1\n")
-        self.fails("has 2 cells; expected 5", alidade.Run(folder)["_ekf"].errors.__getitem__, "t_s")
+        self.fails("has 2 cells; expected 6", alidade.Run(folder)["_ekf"].errors.__getitem__, "t_s")
         path = folder / "_ekf/estimates.csv"
         path.write_text(path.read_text().replace("0.000000000,", "zero,", 1))
         self.fails("'zero'", alidade.Run(folder)["_ekf"].estimates.__getitem__, "t_s")

@@ -37,8 +37,8 @@ def draw(path: Path, options: Options) -> Figure:
         series = {name: values(run, name) for name in chosen}
         if not any(series.values()):
             raise AlidadeError(
-                f"{path}: errors.csv has no columns `nees:OWNER`; a later version of alidade than "
-                f"{run.info['versions']['alidade']} writes them; run the config again with it"
+                f"{path}: no estimator has a NEES; the NEES needs the truth of a block that has a "
+                "covariance"
             )
     owners = [
         owner

@@ -101,6 +101,16 @@ TEST(ReportPage, TextsCannotEndTheElementThatContainsThem) {
   }
 }
 
+TEST(ReportPage, HasASummaryForABrowserWithoutScripts) {
+  const std::string page = PageWithTitle("a < b & c");
+  const std::size_t begin = page.find("<noscript>");
+  ASSERT_NE(begin, page.npos);
+  const std::string text = page.substr(begin, page.find("</noscript>") - begin);
+  EXPECT_NE(text.find("<h1>a &lt; b &amp; c</h1>"), text.npos) << text;
+  EXPECT_NE(text.find("<li>ekf: not tested: "), text.npos) << text;
+  EXPECT_NE(text.find("<li>alone: not tested: "), text.npos) << text;
+}
+
 TEST(ReportPage, QuotesTheLineOfAnError) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment(5);

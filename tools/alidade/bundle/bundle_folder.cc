@@ -7,7 +7,7 @@
 #include "alidade/base/number_text.h"
 #include "alidade/io/json.h"
 #include "alidade/io/output_folder.h"
-#include "alidade/report/page.h"
+#include "alidade/report/page_text.h"
 
 namespace alidade {
 namespace {

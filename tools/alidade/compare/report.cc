@@ -15,7 +15,7 @@
 #include "alidade/io/json.h"
 #include "alidade/io/output_folder.h"
 #include "alidade/io/text_table.h"
-#include "alidade/report/page.h"
+#include "alidade/report/page_text.h"
 
 namespace alidade {
 

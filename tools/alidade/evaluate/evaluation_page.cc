@@ -8,7 +8,7 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/text.h"
 #include "alidade/report/conclusion.h"
-#include "alidade/report/page.h"
+#include "alidade/report/page_text.h"
 #include "alidade/report/trajectory_data.h"
 
 namespace alidade {

@@ -21,7 +21,7 @@
 #include "alidade/record/source_files.h"
 #include "alidade/record/timing_file.h"
 #include "alidade/replay/run_inputs.h"
-#include "alidade/report/page.h"
+#include "alidade/report/page_text.h"
 
 namespace alidade {
 

@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/report/page.h"
 
-#include <exception>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "alidade/base/text.h"
 #include "alidade/config/config.h"
-#include "alidade/io/output_folder.h"
 #include "alidade/io/read_file.h"
 #include "alidade/io/run_files.h"
 #include "alidade/report/bundle_data.h"
 #include "alidade/report/comparison_data.h"
-#include "alidade/report/embedded.h"
+#include "alidade/report/page_text.h"
 #include "alidade/report/quotation.h"
 #include "alidade/report/run_data.h"
 #include "alidade/report/sweep_data.h"
@@ -160,35 +157,6 @@ Json DataOf(const Folder& folder, internal::ColumnPool& pool) try {
   internal::FailFile(folder.path, 0, std::string("a JSON file is invalid (") + error.what() + ')');
 }
 
-/// Replaces all occurrences of `pattern`.
-std::string Replaced(std::string_view text, std::string_view pattern, std::string_view value) {
-  std::string result;
-  for (std::size_t found; (found = text.find(pattern)) != text.npos;) {
-    result.append(text.substr(0, found)).append(value);
-    text.remove_prefix(found + pattern.size());
-  }
-  return result.append(text);
-}
-
-/// Escapes JSON for a script element. The text then contains neither a tag nor a line separator.
-std::string ScriptEscaped(std::string_view json) {
-  const std::string text = Replaced(json, "<", "\\u003c");
-  return Replaced(Replaced(text, "\u2028", "\\u2028"), "\u2029", "\\u2029");
-}
-
-/// Replaces each `{{KEY}}` of the template by its text. The texts are not searched for keys.
-std::string Filled(std::string_view page,
-                   const std::map<std::string, std::string, std::less<>>& texts) {
-  std::string result;
-  for (std::size_t begin; (begin = page.find("{{")) != page.npos;) {
-    const std::size_t end = page.find("}}", begin);
-    result.append(page.substr(0, begin));
-    result.append(texts.at(std::string(page.substr(begin + 2, end - begin - 2))));
-    page.remove_prefix(end + 2);
-  }
-  return result.append(page);
-}
-
 }  // namespace
 
 std::string ReportPage(const fs::path& path) {
@@ -204,55 +172,4 @@ std::string ReportPage(const fs::path& path) {
   return internal::PageText(DataOf(folder, pool), pool);
 }
 
-namespace internal {
-
-std::string PageText(const Json& data, const ColumnPool& pool) {
-  Json whole = {{"format", "alidade-report"},
-                {"version", 1},
-                {"status", "ok"},
-                {"reason", ""},
-                {"failure", {}},
-                {"command", ""},
-                {"config_file", ""},
-                {"program", ALIDADE_VERSION},
-                {"verdict", {}},
-                {"seed", {}},
-                {"frames", {}},
-                {"reference", ""},
-                {"hash", ""},
-                {"config", ""},
-                {"files", Json::array()},
-                {"run", {}},
-                {"compare", {}},
-                {"sweep", {}},
-                {"evaluation", {}},
-                {"bundle", {}}};
-  whole.update(data);
-  std::string text = whole.dump(-1, ' ', false, Json::error_handler_t::replace);
-  text.back() = ',';  // the columns follow
-  text += "\"columns\":" + pool.Text() + '}';
-  const auto title = data.at("title").get<std::string>();
-  return Filled(kPageTemplate, {{"title", Replaced(Replaced(title, "&", "&amp;"), "<", "&lt;")},
-                                {"style", kPageStyle},
-                                {"script", kPageScript},
-                                {"data", ScriptEscaped(text)}});
-}
-
-void WritePage(const OutputFolder& folder) {
-  folder.Write("report.html", ReportPage(folder.partial()));
-}
-
-void CommitWithPage(OutputFolder& folder) {
-  std::exception_ptr error;
-  try {
-    WritePage(folder);
-  } catch (const Error&) {
-    error = std::current_exception();
-    folder.Remove("report.html");
-  }
-  folder.Commit();
-  if (error) std::rethrow_exception(error);
-}
-
-}  // namespace internal
 }  // namespace alidade

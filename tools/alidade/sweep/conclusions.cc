@@ -28,10 +28,11 @@ struct OwnerNees {
   bool is_inside() const { return mean >= bounds.low && mean <= bounds.high; }
 };
 
-/// Returns the mean NEES of each owner. Omits an owner whose NEES is zero, because its blocks are
-/// known exactly.
+/// Returns the mean NEES of each owner over at least two runs. Omits an owner whose NEES is zero,
+/// because its blocks are known exactly.
 std::vector<OwnerNees> NeesOf(const SweepSummary& summary) {
   std::vector<OwnerNees> owners;
+  if (summary.used < 2) return owners;
   for (const auto& [key, bounds] : NeesBounds(summary)) {
     const std::string owner = MetricKey::Parse(key).subject;
     const auto mean = summary.metrics.find(key), dof = summary.metrics.find("nees.dof:" + owner);
@@ -51,12 +52,12 @@ std::string NeesText(const OwnerNees& nees) {
          IntervalText(nees.bounds.low, nees.bounds.high);
 }
 
-/// Returns the mean of a metric over the used runs. Returns nullopt if an estimator diverged in some
-/// run, because the means of different runs cannot be compared.
+/// Returns the mean of a metric over at least two used runs. Returns nullopt if the estimator
+/// diverged in some run, because the means of different runs cannot be compared.
 std::optional<double> ComparableMean(const SweepSummary& summary, const std::string& key) {
   const auto found = summary.metrics.find(key);
   const bool is_known = found != summary.metrics.end() && std::isfinite(found->second.mean);
-  if (!is_known || summary.diverged > 0) return std::nullopt;
+  if (!is_known || summary.diverged > 0 || summary.used < 2) return std::nullopt;
   return found->second.mean;
 }
 
@@ -143,7 +144,7 @@ std::optional<Conclusion> Consistency(const std::vector<SweepSummary>& summaries
   std::vector<std::string> names, details;
   for (const SweepSummary& summary : summaries) {
     const std::vector<OwnerNees> owners = NeesOf(summary);
-    if (owners.empty() || summary.used < 2 || !std::ranges::all_of(owners, IsInside)) continue;
+    if (owners.empty() || !std::ranges::all_of(owners, IsInside)) continue;
     names.push_back(summary.name);
     for (const OwnerNees& nees : owners) details.push_back(summary.name + ": " + NeesText(nees));
   }
@@ -220,7 +221,7 @@ std::vector<Conclusion> ConsistencyByValue(const Variation& variation,
     const auto has = [&](ScaleTest test) {
       return std::ranges::any_of(owners, [&](const OwnerNees& nees) { return nees.test == test; });
     };
-    if (owners.empty() || summaries[v].used < 2) continue;
+    if (owners.empty()) continue;
     const std::string& value = variation.values[v];
     if (std::ranges::all_of(owners, IsInside)) states[0].Add(value, owners);
     if (has(ScaleTest::kTooLarge)) states[1].Add(value, owners);

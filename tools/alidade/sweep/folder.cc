@@ -13,7 +13,7 @@
 #include "alidade/io/json.h"
 #include "alidade/io/output_folder.h"
 #include "alidade/replay/run_inputs.h"
-#include "alidade/report/page.h"
+#include "alidade/report/page_text.h"
 #include "alidade/sweep/conclusions.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/reprojection.h"

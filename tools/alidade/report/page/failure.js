@@ -59,7 +59,8 @@ function failureSection(main) {
     box.append(element('p', {}, place, failure.text));
     if (failure.lines.length) box.append(quotedLines(failure));
   } else {
-    box.append(element('p', {}, DATA.reason || 'The folder states no reason.'));
+    const text = 'A signal stopped the command. The page shows the results so far.';
+    box.append(element('p', {}, DATA.reason || text));
   }
   const hints = CAUSES.filter(([pattern]) => pattern.test(DATA.reason)).map((cause) => cause[1]);
   if (hints.length) box.append(element('p', {}, element('b', {}, 'Likely: '), hints.join(' ')));

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "alidade/io/json.h"
+#include "alidade/io/output_folder.h"
+#include "alidade/report/column_pool.h"
+
+namespace alidade::internal {
+
+/// Returns a page with the facts and results `data` (docs/report.md), without the columns of `pool`.
+std::string PageText(const Json& data, const ColumnPool& pool);
+
+/// Writes `report.html` into an output folder, after all other files.
+void WritePage(const OutputFolder& folder);
+
+/// Writes `report.html` and renames the folder. If the page cannot be written, the folder is
+/// renamed without it, and the error is thrown afterwards.
+void CommitWithPage(OutputFolder& folder);
+
+}  // namespace alidade::internal

@@ -14,6 +14,7 @@
 #include "alidade/record/recorder.h"
 #include "alidade/record/run_viewer.h"
 #include "alidade/replay/run_inputs.h"
+#include "alidade/report/conclusion.h"
 #include "command.h"
 #include "console.h"
 #include "video_name.h"
@@ -91,7 +92,11 @@ std::string EventSummary(const RunResult& result) {
 
 std::string Summary(const RunResult& result, const std::string& table, const Recorder& recorder,
                     const std::string& video) {
-  std::string text = VerdictText(result) + '\n' + table;
+  std::string text = VerdictText(result);
+  for (const std::string& line : internal::ConclusionLines(recorder.conclusions())) {
+    text += line + '\n';
+  }
+  text += '\n' + table;
   if (const std::string events = EventSummary(result); !events.empty()) text += '\n' + events;
   if (!video.empty()) text += "\nwrote " + video + '\n';
   return text + ReportLine(recorder.folder());

@@ -328,13 +328,18 @@ std::string MainTable(const RunResult& result, const std::vector<std::string>& s
 }
 
 std::string ValueText(const std::string& key, double value, const std::string& unit) {
-  RunResult result;
-  EstimatorResult& estimator = result.estimators.emplace_back();
-  const MetricKey parsed = MetricKey::Parse(key);
+  EstimatorResult estimator;
   estimator.metrics[key] = value;
-  estimator.units[parsed.subject] = unit;
-  const ScaledUnit scaled = ScaledUnitOf(result, parsed);
-  return RoundedText(value * scaled.factor, 3) + (scaled.unit.empty() ? "" : ' ' + scaled.unit);
+  estimator.units[MetricKey::Parse(key).subject] = unit;
+  return ValueText(estimator, key);
+}
+
+std::string ValueText(const EstimatorResult& estimator, const std::string& key) {
+  RunResult result;
+  result.estimators.push_back(estimator);
+  const ScaledUnit scaled = ScaledUnitOf(result, MetricKey::Parse(key));
+  const std::string number = RoundedText(estimator.metrics.at(key) * scaled.factor, 3);
+  return number + (scaled.unit.empty() ? "" : ' ' + scaled.unit);
 }
 
 std::string ReferenceText(const RunResult& result) {

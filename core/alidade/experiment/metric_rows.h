@@ -35,6 +35,8 @@ std::vector<TableRow> RowsOf(const RunResult& result, const std::string& name,
 /// Formats a value of the metric `key` with its unit, as in `2.04 mm`. `unit` is the unit of the
 /// subject of the metric.
 std::string ValueText(const std::string& key, double value, const std::string& unit);
+/// Formats the metric `key` of an estimator with its unit. The prefix is that of its largest error.
+std::string ValueText(const EstimatorResult& estimator, const std::string& key);
 /// Returns a sentence about the reference of the errors; "" if the reference is truth.
 std::string ReferenceText(const RunResult& result);
 

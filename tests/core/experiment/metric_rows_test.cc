@@ -194,6 +194,16 @@ TEST(MarkdownTable, KeepsWhatWouldEndACell) {
 
 TEST(ComparisonTable, WithoutEstimatorsIsEmpty) { EXPECT_EQ(ComparisonTable({}), ""); }
 
+TEST(ValueText, HasThePrefixOfTheLargestError) {
+  const EstimatorResult estimator = Named("ekf", {{"rmse:target.depth", 0.002044},
+                                                  {"rmse:target.depth@blind", 0.000994},
+                                                  {"coverage95:target.depth", 0.9539}});
+  EXPECT_EQ(internal::ValueText(estimator, "rmse:target.depth"), "2.04 mm");
+  EXPECT_EQ(internal::ValueText(estimator, "rmse:target.depth@blind"), "0.994 mm");
+  EXPECT_EQ(internal::ValueText(estimator, "coverage95:target.depth"), "95.4 %");
+  EXPECT_EQ(internal::ValueText("rmse:target.depth", 0.000994, "m"), "994 um");
+}
+
 /// Returns an estimator with the verdict `lost` and findings with the given texts.
 EstimatorResult WithFindings(const std::string& name, const std::vector<std::string>& texts) {
   EstimatorResult estimator;

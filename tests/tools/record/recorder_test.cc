@@ -309,6 +309,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   },
   "verdict": "not tested",
   "reference": "truth",
+  "conclusions": [],
   "plugins": [],
   "estimators": {
     "ekf": {

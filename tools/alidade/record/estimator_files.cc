@@ -60,7 +60,8 @@ EstimatorFiles::EstimatorFiles(const OutputFolder& folder, const EstimatorSpec& 
                                const TruthLayout& truth, bool covariances, RunColumns& run_columns)
     : recorded_(Describe(spec)),
       blocks_(BlockLayoutsOf(spec.problem, truth.truths)),
-      width_(WidestMeasurement(spec.problem)) {
+      width_(WidestMeasurement(spec.problem)),
+      history_(blocks_) {
   OpenEstimates(folder, run_columns);
   const auto create = [&](const char* file, std::vector<Column> columns) {
     return CreateCsv(folder, spec.name + file, std::move(columns), run_columns);
@@ -127,6 +128,7 @@ void EstimatorFiles::Add(const SourceFrame& frame, const State& state, const Upd
   if (!report.stale) {
     AddEstimate(frame, state);
     errors_->Add(frame, state);
+    history_.Add(frame, state);
     if (pose_) AddPose(frame.timestamp, state);
   }
   for (const MeasurementReport& measurement : report.measurements()) {

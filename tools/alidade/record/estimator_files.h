@@ -9,6 +9,7 @@
 #include "alidade/record/column_tables.h"
 #include "alidade/record/covariance_file.h"
 #include "alidade/record/errors_file.h"
+#include "alidade/record/estimate_history.h"
 #include "alidade/record/pose_file.h"
 #include "alidade/record/recorded_run.h"
 
@@ -38,6 +39,7 @@ class EstimatorFiles {
   /// kCannotCreate.
   void Close(const OutputFolder& folder, RunColumns& run_columns);
   const RecordedEstimator& recorded() const { return recorded_; }
+  const EstimateHistory& history() const { return history_; }
 
  private:
   static RecordedEstimator Describe(const EstimatorSpec& spec);
@@ -53,6 +55,7 @@ class EstimatorFiles {
   std::vector<BlockLayout> blocks_;
   std::size_t width_;  ///< number of columns of each of z, h, s and r
   GainLayout gain_layout_;
+  EstimateHistory history_;
   std::optional<CsvFile> estimates_, innovations_, gains_, reprojection_;
   std::optional<ErrorsFile> errors_;
   std::optional<PosePlace> pose_;  ///< indices of the blocks of the pose

@@ -17,6 +17,7 @@
 #include "alidade/record/landmarks_file.h"
 #include "alidade/record/landmarks_ply.h"
 #include "alidade/record/log_file.h"
+#include "alidade/record/run_conclusions.h"
 #include "alidade/record/run_json.h"
 #include "alidade/record/source_files.h"
 #include "alidade/record/timing_file.h"
@@ -30,7 +31,7 @@ using Clock = std::chrono::steady_clock;
 struct Recorder::Impl {
   Impl(const Options& recorder_options, const Config& config);
 
-  void CloseFiles();
+  void CloseFiles(const RunResult& result);
   void WriteEvents(const EstimatorResult& result);
   std::string TimingJson(const RunResult& result) const;
   /// Writes all files except run.json and the page.
@@ -68,13 +69,16 @@ Recorder::Impl::Impl(const Options& recorder_options, const Config& config)
   if (!options.inputs.empty()) folder.Write(internal::kInputsFile, options.inputs);
 }
 
-void Recorder::Impl::CloseFiles() {
+void Recorder::Impl::CloseFiles(const RunResult& result) {
   if (source) source->Close();
   if (timing) timing->Close();
+  std::vector<internal::EstimateHistory> histories;
   for (const auto& estimator : estimators) {
     estimator->Close(folder, run_columns);
     facts.recorded.push_back(estimator->recorded());
+    histories.push_back(estimator->history());
   }
+  facts.conclusions = internal::ConclusionsOf(result, histories);
 }
 
 void Recorder::Impl::WriteEvents(const EstimatorResult& result) {
@@ -160,7 +164,7 @@ void Recorder::AddFile(const std::string& name, std::string_view text) {
 
 void Recorder::Impl::WriteResults(const RunResult& result) {
   const std::string timing_json = TimingJson(result);
-  CloseFiles();
+  CloseFiles(result);
   for (const EstimatorResult& estimator : result.estimators) {
     WriteEvents(estimator);
     if (!estimator.landmarks) continue;
@@ -194,6 +198,9 @@ void Recorder::Finish(const RunResult& result) {
   if (IsLogged(LogLevel::kInfo)) Log(LogLevel::kInfo, "wrote " + impl_->options.folder.string());
 }
 
+const std::vector<internal::Conclusion>& Recorder::conclusions() const {
+  return impl_->facts.conclusions;
+}
 const std::filesystem::path& Recorder::folder() const { return impl_->options.folder; }
 
 }  // namespace alidade

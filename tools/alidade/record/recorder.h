@@ -11,6 +11,9 @@
 #include "alidade/experiment/run.h"
 
 namespace alidade {
+namespace internal {
+struct Conclusion;
+}
 
 /// Writer of a run folder (docs/run_folder.md). During the run the folder is `FOLDER.partial`, and
 /// `run.json` has the status `running`. After the run the folder is renamed. If the run failed,
@@ -48,6 +51,8 @@ class Recorder : public RunObserver {
   /// the folder without it, and then throws the error.
   void Finish(const RunResult& result);
 
+  /// Returns the conclusions that Finish() has written to run.json.
+  const std::vector<internal::Conclusion>& conclusions() const;
   const std::filesystem::path& folder() const;
 
  private:

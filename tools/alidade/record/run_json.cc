@@ -103,6 +103,7 @@ std::string RunJson(const RunResult& result, const RunFacts& facts) {
   if (const auto verdict = WorstVerdict(result)) json["verdict"] = ToString(*verdict);
   json["reference"] = result.reference;
   if (!result.withheld.empty()) json["withheld"] = result.withheld;
+  json["conclusions"] = ConclusionsJson(facts.conclusions);
   Json& plugins = json["plugins"] = Json::array();
   for (const auto& [file, hash] : facts.plugins) {
     plugins.push_back({{"file", file}, {"sha256", hash}});

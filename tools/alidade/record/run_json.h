@@ -9,6 +9,7 @@
 #include "alidade/experiment/run.h"
 #include "alidade/io/json.h"
 #include "alidade/record/recorded_run.h"
+#include "alidade/report/conclusion.h"
 
 namespace alidade::internal {
 
@@ -17,6 +18,7 @@ struct RunFacts {
   std::uint64_t seed = 0;
   std::multimap<std::string, std::string> plugins;  ///< file name -> SHA-256
   std::vector<RecordedEstimator> recorded;          ///< files of each estimator
+  std::vector<Conclusion> conclusions;              ///< result of ConclusionsOf()
   std::string measurements_sha256, truth_sha256;    ///< hashes from DataHash; "": no data
 };
 

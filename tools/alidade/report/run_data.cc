@@ -149,7 +149,8 @@ Json RunData(const fs::path& folder, const Json& run, const Node& config, Column
                {"outcomes", OutcomeList()},
                {"truth", TruthData(truth, times, pool)},
                {"implied", ImpliedData(CsvColumns(folder / "implied_states.csv"), times, pool)},
-               {"segments", SegmentData(config, estimators, times)}};
+               {"segments", SegmentData(config, estimators, times)},
+               {"conclusions", run.value("conclusions", Json::array())}};
   Json& list = data["estimators"] = Json::array();
   for (const EstimatorTables& tables : estimators) {
     const Json gate = GateOf(config, tables.name);

@@ -96,9 +96,3 @@ const rejectedCount = (e, sensor) =>
 /** The columns of the landmarks of an estimator. */
 const mapColumns = (e) =>
   Object.fromEntries(Object.entries(e.landmarks).map(([key, ref]) => [key, columnOf(ref)]));
-
-/** The first block with a truth. */
-const mainBlock = () => {
-  const e = RUN.estimators.find((q) => q.blocks.some((b) => b.error.length));
-  return e ? e.blocks.find((b) => b.error.length) : null;
-};

@@ -82,14 +82,5 @@ function choice(label, items, value, change) {
 
 const nameOf = (text, name = text) => element('span', {class: 'est', 'data-est': name}, text);
 
-/** A text whose names of estimators have their colours. */
-function withNames(text) {
-  const names = NAMES.slice().sort((a, b) => b.length - a.length);
-  const escaped = names.map((name) => name.replace(/[.*+?^${}()|[\]\\]/g, '\\$&'));
-  if (!escaped.length) return [text];
-  const pattern = new RegExp(`(?<![\\w-])(${escaped.join('|')})(?![\\w-]|[.]\\w)`);
-  return text.split(pattern).map((part, i) => (i % 2 ? nameOf(part) : part));
-}
-
 /** The last component of the name of a block. */
 const shortName = (block) => block.split('.').pop().replace(/_/g, ' ');

@@ -2,38 +2,23 @@
 // Section "Events".
 
 function eventSection(main) {
+  const timeOf = ({time}) => (time === null ? -1 : time);
   const rows = RUN.estimators
-    .flatMap((e) => e.events.map(([t, kind, text]) => ({e, t, kind, text})))
-    .sort((a, b) => (a.t === null ? -1 : a.t) - (b.t === null ? -1 : b.t));
-  const s = section('events', 'Events', plural(rows.length, 'event'), main);
+    .flatMap((e) => e.events.map(([time, kind, text]) => ({e, time, kind, text})))
+    .sort((a, b) => timeOf(a) - timeOf(b));
+  const box = section('events', 'Events', plural(rows.length, 'event'), main);
   if (!rows.length) {
-    s.append(
-      element(
-        'p',
-        {class: 'panel quiet'},
-        'Nothing was reported: no divergence, no reset, no bound left.',
-      ),
-    );
+    const text = 'Nothing was reported: no divergence, no reset, no bound left.';
+    box.append(element('p', {class: 'panel quiet'}, text));
     return;
   }
-  s.append(
-    element(
-      'div',
-      {class: 'panel'},
-      dataTable(
-        [
-          {
-            name: 'time',
-            get: (r) => (r.t === null ? -1 : r.t),
-            show: (r) => (r.t === null ? 'whole run' : timeLink(r.t)),
-          },
-          {name: 'estimator', text: true, get: (r) => r.e.name, show: (r) => nameOf(r.e.name)},
-          {name: 'kind', text: true, get: (r) => r.kind.replace(/_/g, ' ')},
-          {name: 'what', text: true, wrap: true, get: (r) => r.text},
-        ],
-        rows,
-        {off: (r) => page.hidden.has(r.e.name), tall: true},
-      ),
-    ),
-  );
+  const timeCell = ({time}) => (time === null ? 'whole run' : timeLink(time));
+  const columns = [
+    {name: 'time', get: timeOf, show: timeCell},
+    {name: 'estimator', text: true, get: ({e}) => e.name, show: ({e}) => nameOf(e.name)},
+    {name: 'kind', text: true, get: ({kind}) => kind.replace(/_/g, ' ')},
+    {name: 'what', text: true, wrap: true, get: ({text}) => text},
+  ];
+  const table = dataTable(columns, rows, {off: ({e}) => page.hidden.has(e.name), tall: true});
+  box.append(element('div', {class: 'panel'}, table));
 }

@@ -142,16 +142,8 @@ function lastFramesSection(main) {
     },
   ];
   const box = section('last', 'The last frames', 'newest first', main);
-  box.append(
-    element(
-      'div',
-      {class: 'panel'},
-      RUN.estimators.map(finalState),
-      element('p', {class: 'quiet'}, '± is 3σ'),
-      dataTable(columns, measurementsAfter(from), {
-        tall: true,
-        off: (row) => page.hidden.has(row.e.name),
-      }),
-    ),
-  );
+  const options = {tall: true, off: (row) => page.hidden.has(row.e.name)};
+  const table = dataTable(columns, measurementsAfter(from), options);
+  const legend = element('p', {class: 'quiet'}, '± is 3σ');
+  box.append(element('div', {class: 'panel'}, RUN.estimators.map(finalState), legend, table));
 }

@@ -1,83 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Header with facts and legend.
-
-function legend() {
-  const keys = NAMES.map((name, i) => {
-    const e = RUN && RUN.estimators[i];
-    const v = e && e.verdict && verdictOf(e);
-    return element(
-      'button',
-      {
-        class: 'key',
-        'aria-pressed': 'true',
-        title:
-          (v ? `${v.state}: ${v.because}\n` : '') +
-          `click: hide or show (${i + 1}); double-click: this one alone`,
-        onclick: (e) => {
-          if (e.altKey) toggle(name, true);
-          else toggle(name);
-        },
-        ondblclick: () => setHidden(NAMES.filter((n) => n !== name)),
-        onmouseenter: () => {
-          page.focus = name;
-          redraw();
-        },
-        onmouseleave: () => {
-          page.focus = null;
-          redraw();
-        },
-      },
-      element(
-        'svg',
-        {width: 20, height: 10, 'aria-hidden': 'true'},
-        element('path', {
-          d: 'M0 5h20',
-          'stroke-width': 3,
-          fill: 'none',
-          'stroke-dasharray': dashOf(name).join(' '),
-        }),
-      ),
-      element('span', {class: 'name'}, name),
-      v && element('span', {class: 'mark ' + v.cls, 'aria-label': v.state}, v.mark),
-    );
-  });
-  page.listeners.push(() =>
-    keys.forEach((b, i) => {
-      b.setAttribute('aria-pressed', String(!page.hidden.has(NAMES[i])));
-      b.querySelector('path').setAttribute('stroke', colorOf(NAMES[i]));
-    }),
-  );
-  return element('div', {class: 'legend', role: 'group', 'aria-label': 'estimators'}, keys);
-}
+// Header: title, facts and command.
 
 function headerOf() {
-  const facts = [];
-  const fact = (n, v) =>
-    v !== null &&
-    v !== undefined &&
-    v !== '' &&
-    facts.push(element('li', {}, element('b', {}, v), ' ' + n));
-  fact(NAMES.length === 1 ? 'estimator' : 'estimators', NAMES.length);
-  if (RUN) {
-    const t = columnOf(RUN.t);
-    const dt = quantiles(
-      Array.from(t)
-        .slice(1, 2001)
-        .map((v, i) => v - t[i]),
-      [0.5],
-    )[0];
-    fact('frames', count(t.length));
-    fact('s of data', numberText(page.full[1] - page.full[0]));
-    if (dt > 0) fact('Hz', numberText(1 / dt));
-  }
-  if (SWEEP) fact('runs' + (SWEEP.vary ? ' of each value' : ''), SWEEP.runs);
-  if (DATA.seed !== null && DATA.seed !== undefined)
-    facts.push(element('li', {}, 'seed ', element('b', {}, DATA.seed)));
-  if (DATA.reference)
-    facts.push(element('li', {}, 'errors against ', element('b', {}, DATA.reference)));
-  if (DATA.hash) facts.push(element('li', {}, 'data ', element('code', {}, DATA.hash)));
-  if (DATA.program) facts.push(element('li', {}, 'alidade ' + DATA.program));
-  const theme = element(
+  const tools = element('div', {class: 'tools'}, themeButton(), printButton());
+  const title = element('div', {class: 'headline'}, element('h1', {}, DATA.title), tools);
+  const command =
+    DATA.command &&
+    element('span', {class: 'cmd'}, DATA.command, copyButton(() => DATA.command));
+  return element('header', {}, title, element('ul', {class: 'facts'}, facts()), command);
+}
+
+const printButton = () => element('button', {class: 'btn', onclick: () => print()}, 'print');
+
+const themeButton = () =>
+  element(
     'button',
     {
       class: 'btn',
@@ -87,27 +23,29 @@ function headerOf() {
     },
     '◐',
   );
-  return element(
-    'header',
-    {},
-    element(
-      'div',
-      {class: 'headline'},
-      element('h1', {}, DATA.title),
-      element(
-        'div',
-        {class: 'tools'},
-        theme,
-        element('button', {class: 'btn', onclick: () => print()}, 'print'),
-      ),
-    ),
-    element('ul', {class: 'facts'}, facts),
-    DATA.command &&
-      element(
-        'span',
-        {class: 'cmd'},
-        DATA.command,
-        copyButton(() => DATA.command),
-      ),
-  );
+
+/** The items of the list of facts. Unknown facts are omitted. */
+function facts() {
+  const items = [[strong(NAMES.length), NAMES.length === 1 ? ' estimator' : ' estimators']];
+  if (RUN) items.push(...timeFacts(columnOf(RUN.t)));
+  if (SWEEP) items.push([strong(SWEEP.runs), ' runs', SWEEP.vary ? ' of each value' : '']);
+  if (DATA.seed !== null && DATA.seed !== undefined) items.push(['seed ', strong(DATA.seed)]);
+  if (DATA.reference) items.push(['errors against ', strong(DATA.reference)]);
+  if (DATA.hash) items.push(['data ', element('code', {}, DATA.hash)]);
+  if (DATA.program) items.push(['alidade ' + DATA.program]);
+  return items.map((item) => element('li', {}, item));
 }
+
+/** Number of frames, duration, and the rate by the median time between the first frames. */
+function timeFacts(times) {
+  const steps = Array.from(times.slice(1, 2001)).map((time, i) => time - times[i]);
+  const [step] = quantiles(steps, [0.5]);
+  const items = [
+    [strong(count(times.length)), ' frames'],
+    [strong(numberText(page.full[1] - page.full[0])), ' s of data'],
+  ];
+  if (step > 0) items.push([strong(numberText(1 / step)), ' Hz']);
+  return items;
+}
+
+const strong = (text) => element('b', {}, text);

@@ -70,9 +70,19 @@ function ratioColumns(kind) {
     get: (e) => e.metrics[prefix + subject],
     show: ({metrics}) => {
       const bounds = ['low', 'high'].map((end) => metrics[`${kind}.${end}:${subject}`]);
-      return note(subject, metrics[prefix + subject], ...bounds);
+      return boundedNumber(metrics[prefix + subject], ...bounds);
     },
   }));
+}
+
+/** A number with ▲ or ▼ if it is above or below its 95 % bounds. An exact zero is not marked. */
+function boundedNumber(value, low = null, high = null) {
+  if (value === undefined || value === null) return element('span', {class: 'calm'}, '–');
+  if (low === null || high === null) return element('span', {}, numberText(value));
+  const mark = value > high ? '▲' : value < low && value !== 0 ? '▼' : '';
+  const title = `95 % bounds ${numberText(low)} to ${numberText(high)}`;
+  const tag = mark && element('span', {class: 'tag'}, mark);
+  return element('span', {class: mark ? 'warn' : '', title}, numberText(value), tag);
 }
 
 function runTable() {
@@ -84,8 +94,8 @@ function runTable() {
     ...ratioColumns('nees'),
     ...ratioColumns('nis'),
   ];
-  const table = dataTable(columns, RUN.estimators, {off: (e) => page.hidden.has(e.name)});
-  page.listeners.push(() => table.refill());
+  const table = new Table(columns, RUN.estimators, {off: (e) => page.hidden.has(e.name)});
+  page.listeners.push(() => table.fill());
   return table;
 }
 
@@ -134,9 +144,9 @@ function runTablePanel() {
   const table = runTable();
   const legend = 'Bold: best of its column. ▲ above, ▼ below its 95 % bounds.';
   const buttons = [
-    copyButton(() => table.copy(false), 'copy as Markdown'),
-    copyButton(() => table.copy(true), 'copy as LaTeX'),
+    copyButton(() => markdownText(table), 'copy as Markdown'),
+    copyButton(() => latexText(table), 'copy as LaTeX'),
   ];
   const foot = element('p', {class: 'side'}, element('span', {class: 'quiet'}, legend), buttons);
-  return element('div', {class: 'panel'}, table, foot);
+  return element('div', {class: 'panel'}, table.el, foot);
 }

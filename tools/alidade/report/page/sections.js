@@ -29,6 +29,21 @@ function fold(parent, title, sub, build) {
   return d;
 }
 
+/** A text whose names of estimators have their colours. */
+function withNames(text) {
+  const names = NAMES.slice().sort((a, b) => b.length - a.length);
+  const escaped = names.map((name) => name.replace(/[.*+?^${}()|[\]\\]/g, '\\$&'));
+  if (!escaped.length) return [text];
+  const pattern = new RegExp(`(?<![\\w-])(${escaped.join('|')})(?![\\w-]|[.]\\w)`);
+  return text.split(pattern).map((part, i) => (i % 2 ? nameOf(part) : part));
+}
+
+/** A text whose times, such as `t = 1.5 s`, are links, and whose names have their colours. */
+const withLinks = (text) =>
+  text
+    .split(/\bt = (-?[\d.]+(?:e[+-]?\d+)?) s\b/)
+    .map((part, i) => (i % 2 && RUN ? timeLink(Number(part) - RUN.t0) : withNames(part)));
+
 const TONES = {
   good: ['good', '✓'],
   neutral: ['calm', '·'],
@@ -40,7 +55,7 @@ const TONES = {
 const conclusionItems = (conclusions) =>
   conclusions.map(({tone, text, details}) => {
     const [cls, mark] = TONES[tone];
-    return {cls, mark, text: withNames(text), more: details && withNames(details)};
+    return {cls, mark, text: withLinks(text), more: details && withNames(details)};
   });
 
 function storyList(items) {

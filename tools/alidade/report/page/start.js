@@ -55,7 +55,9 @@ function summarySection(main) {
   if (JUDGED.length) box.append(verdictChips());
   const results = COMPARISON || SWEEP || DATA.evaluation || DATA.bundle || {};
   const conclusions = conclusionItems(results.conclusions || []);
-  const items = [...conclusions, ...(JUDGED.length ? story() : [])];
+  const items = JUDGED.length
+    ? [...conclusions, ...story(), ...conclusionItems(RUN.conclusions)]
+    : conclusions;
   if (items.length) box.append(element('div', {class: 'panel'}, storyList(items)));
   return box;
 }

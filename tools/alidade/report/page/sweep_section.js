@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Section "Runs" of a sweep.
 
+const DISTRIBUTIONS = [
+  ['histogram', 'histogram'],
+  ['ecdf', 'ECDF'],
+];
+
 /** A list of metrics to select from. */
 function metricSelect(label, selected, change) {
   const options = SWEEP.metrics.map((metric) =>
@@ -15,54 +20,63 @@ function metricSelect(label, selected, change) {
   );
 }
 
+/** Figures of the selected metric, in place of those in `holder`. */
+class SweepFigures {
+  constructor(holder, selected) {
+    Object.assign(this, {holder, selected, plots: []});
+  }
+
+  /** Returns a function that sets a choice. */
+  set(key) {
+    return (value) => {
+      this.selected[key] = value;
+      this.build();
+    };
+  }
+
+  build() {
+    dispose(this.plots);
+    this.plots = [];
+    setContent(this.holder);
+    const {metric, second, shape, value} = this.selected;
+    const groups = SWEEP.groups.filter(
+      (group) => valuesOf(group, metric).length && (!SWEEP.vary || group.value === value),
+    );
+    const grid = element('div', {class: 'cols'});
+    this.put(this.holder, seedFigure(groups, metric));
+    this.holder.append(grid);
+    const shapeChoice = choice('', DISTRIBUTIONS, shape, this.set('shape'));
+    this.put(grid, distributionFigure(groups, metric, shape, shapeChoice));
+    const against = metricSelect('against', second, this.set('second'));
+    this.put(grid, twoMetricFigure(groups, metric, second, against));
+    const worst = worstRunTable(groups, metric);
+    if (worst) this.holder.append(worst);
+  }
+
+  put(parent, spec) {
+    this.plots.push(...spec.plots);
+    figure(parent, spec);
+  }
+}
+
 function sweepSection(main) {
   const {metrics, groups, vary} = SWEEP;
   const box = section('runs', 'Runs', `${SWEEP.runs} seeds from ${SWEEP.first_seed}`, main);
-  const holder = element('div');
   const selected = {
     metric: SWEEP.main_metric || metrics[0],
     second: metrics.find((metric) => /^nees\.mean/.test(metric)) || metrics[1] || metrics[0],
     shape: 'histogram',
     value: vary ? groups[0].value : null,
   };
-  let plots = [];
-  const set = (key) => (value) => {
-    selected[key] = value;
-    build();
-  };
-  const put = (parent, spec) => {
-    plots.push(...spec.plots);
-    figure(parent, spec);
-  };
-  function build() {
-    dispose(plots);
-    plots = [];
-    const {metric, second, shape, value} = selected;
-    const own = groups.filter((g) => valuesOf(g, metric).length && (!vary || g.value === value));
-    const grid = element('div', {class: 'cols'});
-    setContent(holder);
-    put(holder, seedFigure(own, metric));
-    holder.append(grid);
-    const shapes = [
-      ['histogram', 'histogram'],
-      ['ecdf', 'ECDF'],
-    ];
-    const shapeChoice = choice('', shapes, shape, set('shape'));
-    put(grid, distributionFigure(own, metric, shape, shapeChoice));
-    const against = metricSelect('against', second, set('second'));
-    put(grid, twoMetricFigure(own, metric, second, against));
-    const worst = worstRunTable(own, metric);
-    if (worst) holder.append(worst);
-  }
+  const holder = element('div');
+  const figures = new SweepFigures(holder, selected);
   const values = variedValues().map(({value, label}) => [value, label]);
-  box.append(
-    element(
-      'div',
-      {class: 'side'},
-      metricSelect('metric', selected.metric, set('metric')),
-      vary && choice(vary, values, selected.value, set('value')),
-    ),
-    holder,
+  const side = element(
+    'div',
+    {class: 'side'},
+    metricSelect('metric', selected.metric, figures.set('metric')),
+    vary && choice(vary, values, selected.value, figures.set('value')),
   );
-  build();
+  box.append(side, holder);
+  figures.build();
 }

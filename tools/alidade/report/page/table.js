@@ -7,140 +7,85 @@
  *   get(row)   number or text that sorts the rows
  *   show(row)  content of the cell; default: the formatted number
  *   text       true: the column contains texts
- *   best       `min` or `one`: the best value of the column is bold
+ *   best       `min`: the least positive number of the column is bold
+ *
+ * Rows for which off(row) is true are grey. `tall` tables scroll.
  */
-function dataTable(columns, rows, {off, tall} = {}) {
-  const body = element('tbody');
-  let by = null;
-  let up = true;
-  const bestOf = (c) => {
-    if (!c.best) return null;
-    const v = rows.map(c.get).filter((x) => Number.isFinite(x) && x !== 0);
-    return v.length > 1
-      ? Math.min(...v.map((x) => (c.best === 'one' ? Math.abs(Math.log(x)) : x)))
-      : null;
-  };
-  const bests = columns.map(bestOf);
-  const heads = columns.map((c, i) =>
-    element(
-      'th',
-      {
-        class: c.text ? 'text' : '',
-        'aria-sort': 'none',
-        title: c.title,
-        tabindex: 0,
-        onclick: () => sort(i),
-        onkeydown: (e) => {
-          if (e.key === 'Enter') sort(i);
-        },
+class Table {
+  constructor(columns, rows, {off = () => false, tall} = {}) {
+    Object.assign(this, {columns, rows, off, sorted: null, ascending: true});
+    this.least = columns.map((column) => (column.best ? this.leastOf(column) : null));
+    this.heads = columns.map((column, i) => this.headCell(column, i));
+    this.body = element('tbody');
+    const head = element('thead', {}, element('tr', {}, this.heads));
+    const table = element('table', {}, head, this.body);
+    this.el = element('div', {class: 'scroll' + (tall ? ' tall' : '')}, table);
+    this.fill();
+  }
+
+  /** The least positive number of a column; null: fewer than two numbers. */
+  leastOf(column) {
+    const values = this.rows.map(column.get).filter((v) => Number.isFinite(v) && v > 0);
+    return values.length > 1 ? Math.min(...values) : null;
+  }
+
+  headCell(column, i) {
+    const attributes = {
+      class: column.text ? 'text' : '',
+      'aria-sort': 'none',
+      title: column.title,
+      tabindex: 0,
+      onclick: () => this.sort(i),
+      onkeydown: ({key}) => {
+        if (key === 'Enter') this.sort(i);
       },
-      c.name,
-      c.sub ? element('small', {}, c.sub) : null,
-    ),
-  );
-  function fill() {
-    const sorted =
-      by === null
-        ? rows
-        : rows.slice().sort((a, b) => {
-            const x = columns[by].get(a);
-            const y = columns[by].get(b);
-            const d =
-              typeof x === 'string'
-                ? String(x).localeCompare(y)
-                : (Number.isFinite(x) ? x : Infinity) - (Number.isFinite(y) ? y : Infinity);
-            return up ? d : -d;
-          });
-    setContent(
-      body,
-      sorted.map((r) =>
-        element(
-          'tr',
-          {class: off && off(r) ? 'off' : ''},
-          columns.map((c, i) => {
-            const v = c.get(r);
-            const best =
-              bests[i] !== null &&
-              Number.isFinite(v) &&
-              v !== 0 &&
-              (c.best === 'one' ? Math.abs(Math.log(v)) : v) === bests[i];
-            return element(
-              'td',
-              {
-                class: [c.text && 'text', c.wrap && 'wrap', best && 'best']
-                  .filter(Boolean)
-                  .join(' '),
-              },
-              c.show ? c.show(r) : typeof v === 'number' ? numberText(v) : v,
-            );
-          }),
-        ),
-      ),
-    );
+    };
+    return element('th', attributes, column.name, column.sub && element('small', {}, column.sub));
   }
-  function sort(i) {
-    up = by === i ? !up : true;
-    by = i;
-    heads.forEach((t, k) =>
-      t.setAttribute('aria-sort', k === i ? (up ? 'ascending' : 'descending') : 'none'),
-    );
-    fill();
+
+  sort(i) {
+    this.ascending = this.sorted === i ? !this.ascending : true;
+    this.sorted = i;
+    const order = this.ascending ? 'ascending' : 'descending';
+    this.heads.forEach((head, k) => head.setAttribute('aria-sort', k === i ? order : 'none'));
+    this.fill();
   }
-  fill();
-  const el = element(
-    'div',
-    {class: 'scroll' + (tall ? ' tall' : '')},
-    element('table', {}, element('thead', {}, element('tr', {}, heads)), body),
-  );
-  el.refill = fill;
-  el.copy = (latex) => {
-    const cell = (x) =>
-      x instanceof Node
-        ? x.textContent
-        : String(x === null || x === undefined ? '' : typeof x === 'number' ? numberText(x) : x);
-    const line = (r) => columns.map((c) => cell(c.show ? c.show(r) : c.get(r)));
-    const head = columns.map((c) => c.name + (c.sub ? ' ' + c.sub : ''));
-    const all = rows.map(line);
-    return latex
-      ? `\\begin{tabular}{l${'r'.repeat(head.length - 1)}}\n${[head, ...all]
-          .map(
-            (r) =>
-              r
-                .map((x) =>
-                  x
-                    .replace(/[_%&#]/g, '\\$&')
-                    .replace(/−/g, '$-$')
-                    .replace(/[▲▼✓✕]/g, ''),
-                )
-                .join(' & ') + ' \\\\',
-          )
-          .join('\n')}\n\\end{tabular}\n`
-      : [head, head.map(() => '---'), ...all].map((row) => `| ${row.join(' | ')} |\n`).join('');
-  };
-  return el;
+
+  sortedRows() {
+    if (this.sorted === null) return this.rows;
+    const {get} = this.columns[this.sorted];
+    const sign = this.ascending ? 1 : -1;
+    return this.rows.slice().sort((a, b) => sign * compareValues(get(a), get(b)));
+  }
+
+  fill() {
+    const rowOf = (row) =>
+      element(
+        'tr',
+        {class: this.off(row) ? 'off' : ''},
+        this.columns.map((column, i) => this.cell(column, i, row)),
+      );
+    setContent(this.body, this.sortedRows().map(rowOf));
+  }
+
+  cell(column, i, row) {
+    const isBest = this.least[i] !== null && column.get(row) === this.least[i];
+    const names = [column.text && 'text', column.wrap && 'wrap', isBest && 'best'];
+    return element('td', {class: names.filter(Boolean).join(' ')}, cellContent(column, row));
+  }
 }
 
-const note = (owner, value, low, high, title) =>
-  value === undefined || value === null
-    ? element('span', {class: 'calm'}, '–')
-    : element(
-        'span',
-        {
-          class:
-            value === 0 || low === undefined || low === null
-              ? ''
-              : value > high || value < low
-                ? 'warn'
-                : '',
-          title:
-            low === undefined || low === null
-              ? title
-              : `95 % bounds ${numberText(low)} to ${numberText(high)}`,
-        },
-        numberText(value),
-        low !== null && low !== undefined && value > high
-          ? element('span', {class: 'tag'}, '▲')
-          : low !== null && low !== undefined && value < low && value !== 0
-            ? element('span', {class: 'tag'}, '▼')
-            : null,
-      );
+const dataTable = (columns, rows, options) => new Table(columns, rows, options).el;
+
+function cellContent({get, show}, row) {
+  if (show) return show(row);
+  const value = get(row);
+  return typeof value === 'number' ? numberText(value) : value;
+}
+
+/** Order of texts or numbers; numbers that are not finite come last. */
+function compareValues(a, b) {
+  if (typeof a === 'string') return a.localeCompare(b);
+  const [x, y] = [a, b].map((value) => (Number.isFinite(value) ? value : Number.MAX_VALUE));
+  return x - y;
+}

@@ -12,7 +12,6 @@ const VERDICTS = {
   consistent: ['good', '✓'],
   'not tested': ['calm', '?'],
 };
-const GRAVITY = ['calm', 'good', 'warn', 'bad'];
 
 /** The estimators with a verdict. Trajectories from files have none. */
 const JUDGED = RUN ? RUN.estimators.filter((e) => e.verdict) : [];

@@ -93,6 +93,16 @@ void PrepareConsole() {
   ::signal(SIGXFSZ, SIG_IGN);
 }
 
+std::string ShellQuoted(const std::string& text) {
+  constexpr const char* kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+      "%+,-./:=@_";
+  if (!text.empty() && text.find_first_not_of(kPlain) == text.npos) return text;
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + '\'';
+}
+
 void Print(std::string_view text) {
   if (WriteAll(STDOUT_FILENO, text)) return;
   const std::string reason = std::generic_category().message(errno);

@@ -14,6 +14,9 @@ namespace alidade::cli {
 /// reports an error instead of ending the process.
 void PrepareConsole();
 
+/// Returns `text` as one word of a shell, quoted if necessary.
+std::string ShellQuoted(const std::string& text);
+
 /// Writes `text` to standard output. Error: kIo if a byte cannot be written.
 void Print(std::string_view text);
 

@@ -11,7 +11,7 @@
 namespace alidade::cli {
 namespace {
 
-/// Parses the place at the start of a message. The result has no line if there is no place.
+/// Parses the place at the start of a message. Without such a place, the result has no line.
 Place PlaceOf(std::string_view message) {
   constexpr std::size_t kMaxPlace = 1000;
   static const std::regex pattern("^([^\n]+?):([0-9]{1,8}):([0-9]{1,4})[: ]");

@@ -2,7 +2,6 @@
 #include "sweep_report.h"
 
 #include <algorithm>
-#include <cctype>
 
 #include "alidade/io/output_folder.h"
 #include "alidade/replay/run_inputs.h"
@@ -30,29 +29,19 @@ bool ReportFailures(const SweepResult& result, const std::string& prefix) {
   return failed > 0;
 }
 
-/// Returns the text as one word of a shell command.
-std::string ShellWord(const std::string& text) {
-  const auto is_plain = [](unsigned char c) {
-    return std::isalnum(c) != 0 || c == '/' || c == '.' || c == '_' || c == '-';
-  };
-  if (std::ranges::all_of(text, is_plain)) return text;
-  std::string word = "'";
-  for (const char c : text) c == '\'' ? word += "'\\''" : word += c;
-  return word + '\'';
-}
-
 /// Returns the lines of the worst seeds, and the command that repeats the run of the worst. Returns
 /// "" if no seeds are listed. `inputs` is the text of inputs.json.
 std::string WorstSeedText(const SweepResult& result, const std::filesystem::path& folder,
                           const std::string& inputs) {
   const std::vector<internal::WorstSeeds> worst = internal::FindWorstSeeds(result);
   if (worst.empty()) return "";
-  std::string command = "alidade run " + ShellWord((folder / internal::kResolvedConfig).string()) +
-                        " --seed " + std::to_string(worst.front().seeds.front());
+  std::string command = "alidade run " +
+                        ShellQuoted((folder / internal::kResolvedConfig).string()) + " --seed " +
+                        std::to_string(worst.front().seeds.front());
   const internal::RecordedInputs recorded =
       internal::ReadInputs(inputs, (folder / internal::kInputsFile).string());
   for (const std::filesystem::path& path : recorded.command.plugin_paths) {
-    command += " --plugin-path " + ShellWord(path.string());
+    command += " --plugin-path " + ShellQuoted(path.string());
   }
   return internal::WorstSeedLines(worst) + "repeat the run of a seed: " + command + '\n';
 }

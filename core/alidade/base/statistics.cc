@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <vector>
 
 #include "alidade/base/error.h"
@@ -124,15 +125,30 @@ double Quantile(const std::vector<double>& ascending, double q) {
   return fraction == 0.0 || low == high ? low : low + fraction * (high - low);
 }
 
+double Median(std::vector<double> values) {
+  std::ranges::sort(values);
+  return Quantile(values, 0.5);
+}
+
+double Mean(std::span<const double> values) {
+  ALIDADE_EXPECTS(!values.empty());
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+double SquaredDeviation(std::span<const double> values) {
+  const double mean = Mean(values);
+  double sum = 0.0;
+  for (const double value : values) sum += (value - mean) * (value - mean);
+  return sum;
+}
+
 Spread SpreadOf(std::vector<double> values) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   std::erase_if(values, [](double value) { return std::isnan(value); });
   if (values.empty()) return {kNaN, kNaN, kNaN, kNaN};
-  std::sort(values.begin(), values.end());
-  double sum = 0.0;
-  for (const double value : values) sum += value;
-  return {sum / static_cast<double>(values.size()), Quantile(values, 0.05), Quantile(values, 0.5),
-          Quantile(values, 0.95)};
+  std::ranges::sort(values);
+  return {Mean(values), Quantile(values, 0.05), Quantile(values, 0.5), Quantile(values, 0.95),
+          values.size()};
 }
 
 }  // namespace alidade

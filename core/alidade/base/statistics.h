@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <limits>
+#include <span>
 #include <vector>
 
 namespace alidade {
@@ -45,12 +47,20 @@ ScaleTest TestScale(double mean, double dof, double n);
 ///   x[k] + (h - k) (x[k + 1] - x[k]),   h = (n - 1) q,   k = floor h
 double Quantile(const std::vector<double>& ascending, double q);
 
+/// Returns the median. `values` must not be empty.
+double Median(std::vector<double> values);
+/// Returns the mean. `values` must not be empty.
+double Mean(std::span<const double> values);
+/// Returns the sum of squared deviations from the mean. `values` must not be empty.
+double SquaredDeviation(std::span<const double> values);
+
 /// Mean and quantiles of a set of values. p05, p50 and p95 are the 5 %, 50 % and 95 % quantiles.
 struct Spread {
   double mean = 0.0, p05 = 0.0, p50 = 0.0, p95 = 0.0;
+  std::size_t count = 0;  ///< number of values that are not NaN
 };
-/// Returns the spread of the values that are not NaN. Every member is NaN if there are no such
-/// values.
+/// Returns the spread of the values that are not NaN. Without such values, the mean and quantiles
+/// are NaN.
 Spread SpreadOf(std::vector<double> values);
 
 }  // namespace alidade

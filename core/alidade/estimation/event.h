@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <string>
 
+#include "alidade/base/enum_table.h"
 #include "alidade/base/timestamp.h"
 
 namespace alidade {
@@ -163,14 +164,9 @@ inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kEstimatorSpecific, "estimator_specific", EventSeverity::kInfo,
                   "an event of an estimator plugin to which no other kind applies"},
 };
-static_assert(
-    [] {
-      for (std::size_t i = 0; i < kEventKinds.size(); ++i) {
-        if (kEventKinds[i].kind != static_cast<EventKind>(i)) return false;
-      }
-      return kEventKinds.back().kind == EventKind::kEstimatorSpecific;
-    }(),
-    "kEventKinds must have one entry for each EventKind, in the order of EventKind");
+static_assert(internal::HasEntryForEach(kEventKinds, &EventKindInfo::kind,
+                                        EventKind::kEstimatorSpecific),
+              "kEventKinds must have one entry for each EventKind, in the order of EventKind");
 
 /// Returns the entry of a kind.
 inline const EventKindInfo& InfoOf(EventKind kind) {

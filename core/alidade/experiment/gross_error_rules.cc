@@ -46,17 +46,17 @@ const UnitFactor* NearestFactor(double ratio, bool with_small) {
   return nearest;
 }
 
-MaybeFinding UnitFinding(const InnovationView& view, std::size_t k, double ratio,
-                         const std::string& measurement, const std::string& meaning) {
+std::optional<Finding> UnitFinding(const InnovationView& view, std::size_t k, double ratio,
+                                   const std::string& measurement, const std::string& meaning) {
   return MakeFinding(FindingKind::kUnit, view, ratio,
-                     ElementPrefix(view, k) + measurement + " is " + RoundedText(ratio, 3) +
+                     ElementPrefix(view, k) + measurement + " is " + RoundedText(ratio, 4) +
                          " times its prediction, which is " + meaning +
                          "; check the unit of the data, of the prior and of the parameters");
 }
 
 /// Compares the first measurement, to which no update has adapted the state yet, with the
 /// prediction by the prior. If the prediction may be 0, a large ratio has no meaning.
-MaybeFinding TestFirstRatio(const InnovationView& view) {
+std::optional<Finding> TestFirstRatio(const InnovationView& view) {
   for (std::size_t k = 0; k < view.dof(); ++k) {
     if (!view.has_z(k)) continue;
     const double ratio = view.z(0, k) / view.h(0, k);
@@ -83,7 +83,7 @@ Rows FarRows(const InnovationView& view) {
 }
 
 /// Compares the ratios z / h of several measurements, which have to agree.
-MaybeFinding TestMedianRatio(const InnovationView& view) {
+std::optional<Finding> TestMedianRatio(const InnovationView& view) {
   constexpr std::size_t kMinRatios = 3;
   constexpr double kLargeSpread = 0.3, kSmallSpread = 0.05;
   const Rows rows = FarRows(view);
@@ -101,7 +101,8 @@ MaybeFinding TestMedianRatio(const InnovationView& view) {
     const double spread = Median(distances);
     if (!(spread < kLargeSpread)) continue;
     if (median < 0.0) {
-      if (spread > kSmallSpread || std::abs(median + 1.0) > kSmallSpread) continue;
+      const bool is_opposite = spread <= kSmallSpread && std::abs(median + 1.0) <= kSmallSpread;
+      if (!is_opposite || view.is_angle(k)) continue;  // pi and -pi are the same angle
       return MakeFinding(FindingKind::kUnit, view, median,
                          ElementPrefix(view, k) +
                              "the measurement is -1 times its prediction; check the sign and the "
@@ -116,7 +117,7 @@ MaybeFinding TestMedianRatio(const InnovationView& view) {
 
 /// Detects a latitude and a longitude that are read as metres: they hardly vary, compared with
 /// sigma.
-MaybeFinding TestDegreesAsMetres(const InnovationView& view) {
+std::optional<Finding> TestDegreesAsMetres(const InnovationView& view) {
   constexpr std::size_t kMinSize = 10;
   constexpr double kMaxVariation = 0.01, kLimits[] = {90.0, 180.0};
   if (view.size() < kMinSize || view.dof() < 2) return {};
@@ -171,8 +172,8 @@ struct SwapEffect {
   double before, after;
 };
 SwapEffect EffectOfSwap(const InnovationView& view, std::size_t i, std::size_t a, std::size_t b) {
-  const double swapped_a = (view.z(i, b) - view.h(i, a)) / view.s(i, a);
-  const double swapped_b = (view.z(i, a) - view.h(i, b)) / view.s(i, b);
+  const double swapped_a = view.Difference(view.z(i, b), view.h(i, a), a) / view.s(i, a);
+  const double swapped_b = view.Difference(view.z(i, a), view.h(i, b), b) / view.s(i, b);
   return {std::hypot(view.u(i, a), view.u(i, b)) / std::numbers::sqrt2,
           std::hypot(swapped_a, swapped_b) / std::numbers::sqrt2};
 }
@@ -199,7 +200,7 @@ std::string UnitHint(double ratio) {
   return unit ? std::string(" (near ") + unit->meaning + ')' : "";
 }
 
-MaybeFinding TestTimeUnit(const InnovationView& view) {
+std::optional<Finding> TestTimeUnit(const InnovationView& view) {
   constexpr double kLongStep_s = 10.0, kFarRatio = 20.0;
   const InnovationSeries& series = view.series();
   if (series.frames < 2) return {};
@@ -216,18 +217,18 @@ MaybeFinding TestTimeUnit(const InnovationView& view) {
                          "convert them to s");
 }
 
-MaybeFinding TestUnit(const InnovationView& view) {
+std::optional<Finding> TestUnit(const InnovationView& view) {
   if (view.size() == 0) return {};
-  if (MaybeFinding finding = TestDegreesAsMetres(view)) return finding;
+  if (std::optional<Finding> finding = TestDegreesAsMetres(view)) return finding;
   const bool is_prior_far = TestPrior(view).has_value();
   if (is_prior_far) {
-    if (MaybeFinding finding = TestFirstRatio(view)) return finding;
+    if (std::optional<Finding> finding = TestFirstRatio(view)) return finding;
   }
   if (!is_prior_far && !IsMostlyRejected(view) && !StartsFarOff(view)) return {};
   return TestMedianRatio(view);
 }
 
-MaybeFinding TestPrior(const InnovationView& view) {
+std::optional<Finding> TestPrior(const InnovationView& view) {
   constexpr double kFalseAlarm = 1e-6, kMaxRatio = 16.0;
   double count = 0.0, largest = 0.0;
   for (std::size_t i = 0; i < view.size() && view.frame(i) < kFirstFrames; ++i, ++count) {
@@ -246,7 +247,7 @@ MaybeFinding TestPrior(const InnovationView& view) {
                          "prior");
 }
 
-MaybeFinding TestDomain(const InnovationView& view) {
+std::optional<Finding> TestDomain(const InnovationView& view) {
   const InnovationSeries& series = view.series();
   const double share = static_cast<double>(series.out_of_domain) /
                        static_cast<double>(std::max<std::int64_t>(series.total, 1));
@@ -258,7 +259,7 @@ MaybeFinding TestDomain(const InnovationView& view) {
                          "lost; check the prior, the units and the times");
 }
 
-MaybeFinding TestRejections(const InnovationView& view) {
+std::optional<Finding> TestRejections(const InnovationView& view) {
   constexpr std::size_t kMinRows = 5, kMaxInARow = 10;
   constexpr const char* kRemedy =
       "; check the prior, the units, the noise of the sensor and the process noise";
@@ -275,7 +276,7 @@ MaybeFinding TestRejections(const InnovationView& view) {
                          " consecutive timestamps were rejected" + kRemedy);
 }
 
-MaybeFinding TestSwap(const InnovationView& view) {
+std::optional<Finding> TestSwap(const InnovationView& view) {
   constexpr double kMinGain = 5.0, kMaxAfter = 5.0;
   for (std::size_t a = 0; a < view.dof(); ++a) {
     for (std::size_t b = a + 1; b < view.dof(); ++b) {
@@ -293,10 +294,10 @@ MaybeFinding TestSwap(const InnovationView& view) {
   return {};
 }
 
-MaybeFinding TestStuck(const InnovationView& view) {
+std::optional<Finding> TestStuck(const InnovationView& view) {
   constexpr std::size_t kMinRepetitions = 20;
   const std::vector<double>& z = view.series().z;
-  const auto size = static_cast<std::ptrdiff_t>(view.size() == 0 ? 0 : z.size() / view.size());
+  const std::ptrdiff_t size = view.series().ambient;
   std::size_t longest = 0, current = 0;
   double since_s = 0.0;
   for (std::size_t i = 1; i < view.size(); ++i) {

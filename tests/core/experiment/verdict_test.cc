@@ -68,6 +68,28 @@ TEST(Verdict, IsTheFirstThatApplies) {
   EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kFailed);
 }
 
+TEST(Verdict, NamesTheEventThatEndedTheEstimator) {
+  const Event skipped{1, EventKind::kPluginFailed, "a measurement was skipped"};
+  Event diverged{7, EventKind::kDiverged, "out of domain"};
+  diverged.divergence = true;
+  const std::vector<Event> events = {skipped, diverged};
+  const Verdict verdict = ComputeVerdict({.diverged = true, .events = events});
+  EXPECT_EQ(verdict.because, "out of domain");
+  EXPECT_EQ(verdict.since, 7);
+}
+
+TEST(Verdict, CountsDependentValuesOfTheNeesAsOne) {
+  NeesSeries constant{"target", 3.0, std::vector<double>(100, 5.0)}, slow = constant;
+  for (int i = 0; i < 100; ++i) slow.values[i] = 0.1 * i;
+  const Verdict of_constant = ComputeVerdict({.nees = {&constant, 1}}),
+                of_slow = ComputeVerdict({.nees = {&slow, 1}});
+  EXPECT_EQ(of_constant.state, VerdictState::kConsistent);
+  EXPECT_NE(of_constant.because.find("5 (nearly constant)"), std::string::npos);
+  EXPECT_EQ(of_slow.state, VerdictState::kConsistent);
+  EXPECT_NE(of_slow.because.find("4.95 (strongly correlated)"), std::string::npos)
+      << of_slow.because;
+}
+
 TEST(Verdict, MentionsTheEventThatDigitsWereLost) {
   const NeesSeries nees = MakeNees(1.0, 200);
   const Event lost{5, EventKind::kDigitsLost, "a variance is lost by rounding"};

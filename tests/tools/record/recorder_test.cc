@@ -350,6 +350,9 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
           "z_index": [
             0
           ],
+          "is_angle": [
+            false
+          ],
           "robust_loss": false,
           "landmark_prior": false
         },
@@ -359,6 +362,9 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
           ],
           "z_index": [
             0
+          ],
+          "is_angle": [
+            false
           ],
           "robust_loss": false,
           "landmark_prior": false

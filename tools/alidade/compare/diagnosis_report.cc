@@ -31,7 +31,7 @@ std::string AlarmText(const ParameterTest& test) {
                                  : " has almost the same effect as " + test.alternative_to;
   return "  " + test.key + " is " + RoundedText(test.value, 4) + ", but " +
          RoundedText(test.better, 3) + effect + " (|z| = " + RoundedText(std::abs(test.z), 3) +
-         ", log-likelihood +" + RoundedText(test.gain, 3) + "): --set '" + test.setting + "'\n";
+         ", log-likelihood +" + RoundedText(test.gain, 3) + "); try --set '" + test.setting + "'\n";
 }
 
 /// Returns a sentence for an estimator without an alarm. `tests` are sorted.
@@ -41,7 +41,7 @@ std::string NoAlarmText(const std::vector<ParameterTest>& tests) {
   return "  no other value of a parameter explains the innovations better: the largest |z| of " +
          std::to_string(count) + (count == 1 ? " parameter" : " parameters") + " is " +
          RoundedText(std::abs(tests.front().z), 3) + " (" + tests.front().key +
-         "), and an error exceeds " + RoundedText(kParameterAlarm) + '\n';
+         "); a wrong number would exceed " + RoundedText(kParameterAlarm) + '\n';
 }
 
 internal::Json ParametersJson(const ParameterTests& tests) {

@@ -17,7 +17,7 @@ void WriteSweepCsv(const OutputFolder& folder, const VariedSweep& sweep);
 std::string VariedMarkdown(const VariedSweep& sweep);
 
 /// Draws `figures/vary.svg` from sweep.csv: errors, lags, coverage and divergence over the values.
-/// Returns why there is none, or "". Errors: kIo.
+/// Returns "", or the reason why the figure was not drawn. Errors: kIo.
 std::string DrawVariation(const OutputFolder& folder, const VariedSweep& sweep,
                           const std::function<bool()>& stop);
 

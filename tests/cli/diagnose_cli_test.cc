@@ -128,8 +128,9 @@ TEST_F(DiagnoseCli, WhyNamesTheWrongSigmaAndASettingThatRemovesTheAlarm) {
   EXPECT_NEAR(sigma, 2.0, 0.4);
   Arguments corrected = kNoisyStereo;
   corrected.push_back("estimators.ekf.overrides.sensors.stereo.sigma_px=" + std::to_string(sigma));
-  EXPECT_TRUE(Contains(Diagnose(corrected, {"--why"}).out,
-                       "no other value of a parameter explains the innovations better"))
+  EXPECT_TRUE(
+      Contains(Diagnose(corrected, {"--why"}).out,
+               "no other value of a parameter explains the innovations significantly better"))
       << Read("stdout");
 }
 

@@ -102,13 +102,13 @@ Interval ConsistencyBounds(double dof, double n, double cut) {
   return {m * ChiSquareQuantile(0.025, nu) / nu, m * ChiSquareQuantile(0.975, nu) / nu};
 }
 
-ScaleTest TestScale(double mean, double dof, double n) {
-  constexpr double kProbability = 8e-7, kSmallestFactor = 1.15 * 1.15;
+ScaleTest TestScale(double mean, double dof, double n, double p) {
+  constexpr double kSmallestFactor = 1.15 * 1.15;
   const double nu = n * dof;
-  if (mean >= kSmallestFactor && mean > ChiSquareQuantile(1.0 - kProbability, nu) / nu) {
+  if (mean >= kSmallestFactor && mean > ChiSquareQuantile(1.0 - p, nu) / nu) {
     return ScaleTest::kTooLarge;
   }
-  if (mean <= 1.0 / kSmallestFactor && mean < ChiSquareQuantile(kProbability, nu) / nu) {
+  if (mean <= 1.0 / kSmallestFactor && mean < ChiSquareQuantile(p, nu) / nu) {
     return ScaleTest::kTooSmall;
   }
   return ScaleTest::kPassed;

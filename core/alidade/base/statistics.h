@@ -36,10 +36,10 @@ Interval ConsistencyBounds(double dof, double n,
 /// Result of TestScale.
 enum class ScaleTest { kPassed, kTooLarge, kTooSmall };
 /// Tests whether the mean of n independent values of chi2(dof) / dof, such as NEES / dof, may be 1.
-/// The mean is too large if it exceeds chi2(1 - 8e-7, nu) / nu, nu = n dof, and is at least 1.15^2.
-/// It is too small if it is below chi2(8e-7, nu) / nu and at most 1.15^-2. n need not be an
-/// integer. The probability of a false alarm is 1.6e-6.
-ScaleTest TestScale(double mean, double dof, double n);
+/// The mean is too large if it exceeds chi2(1 - p, nu) / nu, nu = n dof, and is at least 1.15^2. It
+/// is too small if it is below chi2(p, nu) / nu and at most 1.15^-2. n need not be an integer. The
+/// probability of a false alarm is 2 p.
+ScaleTest TestScale(double mean, double dof, double n, double p = 8e-7);
 
 /// Returns the q-quantile of the ascending values x[0..n-1], n > 0. q is in [0, 1]. Interpolates
 /// linearly between the values (type 7 of Hyndman and Fan):

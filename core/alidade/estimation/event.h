@@ -88,8 +88,10 @@ inline constexpr std::array kEventKinds = {
                   "units"},
     EventKindInfo{EventKind::kUnused, "unused", EventSeverity::kWarning,
                   "the estimator used no measurement of this sensor; the text states the reason"},
-    EventKindInfo{EventKind::kNoMeasurement, "no_measurement", EventSeverity::kWarning,
-                  "the estimator used no measurement of any sensor for a long time"},
+    EventKindInfo{
+        EventKind::kNoMeasurement, "no_measurement", EventSeverity::kWarning,
+        "the estimator used no measurement for a long time, or a sensor had none at the end of the "
+        "run"},
     EventKindInfo{EventKind::kTruth, "truth", EventSeverity::kWarning,
                   "the source provides ground truth, but no frame contained a true value"},
     EventKindInfo{EventKind::kUnobservable, "unobservable", EventSeverity::kWarning,

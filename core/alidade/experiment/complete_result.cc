@@ -75,13 +75,19 @@ void AddRejectionEvents(const std::vector<SensorUse>& sensors, EstimatorResult& 
   }
 }
 
-/// Adds an event `no_measurement` if the estimator used no measurement for a long time.
-void AddGapEvent(const MeasurementLog& log, EstimatorResult& result) {
-  const auto gap = log.longest_gap();
-  if (!gap) return;
-  result.events.push_back({gap->start, EventKind::kNoMeasurement,
-                           "no measurement was used for " + SecondsText(gap->end - gap->start) +
-                               ", until " + SecondsText(gap->end)});
+/// Adds an event `no_measurement` if the estimator used no measurement for a long time, or else for
+/// each sensor that has no measurement at the end of the run.
+void AddGapEvents(const MeasurementLog& log, EstimatorResult& result) {
+  const auto add = [&](const MeasurementLog::Gap& gap, const std::string& what) {
+    result.events.push_back(
+        {gap.start, EventKind::kNoMeasurement,
+         what + " for " + SecondsText(gap.end - gap.start) + ", until " + SecondsText(gap.end)});
+  };
+  if (const auto gap = log.longest_gap()) return add(*gap, "no measurement was used");
+  for (std::size_t i = 0; i < log.uses().size(); ++i) {
+    const auto gap = log.FinalGap(i);
+    if (gap) add(*gap, "sensor '" + log.uses()[i].sensor + "' had no measurement");
+  }
 }
 
 /// Adds the findings about the innovations, and the verdict.
@@ -155,7 +161,7 @@ void CompleteResult(const Experiment& experiment, EstimatorRun& run, std::string
   const bool is_known = run.has_estimate && !estimator.failed();
   if (is_known) AddUnusedEvents(problem, result);
   if (is_known) AddRejectionEvents(run.measurement_log.uses(), result);
-  if (is_known) AddGapEvent(run.measurement_log, result);
+  if (is_known) AddGapEvents(run.measurement_log, result);
   if (is_known && experiment.reference < 0) AddTruthEvent(run.metrics, result);
   AddUnitEvents(problem, run.measurement_log.innovations(), result);
   AddRoleEvents(problem, result);

@@ -55,7 +55,7 @@ inline constexpr std::array kFindingKinds = {
     FindingKindInfo{FindingKind::kSwapped, "swapped",
                     "two elements of the measurement appear to be exchanged"},
     FindingKindInfo{FindingKind::kStuck, "stuck",
-                    "the same measurement was repeated many times in a row"},
+                    "an element of the measurement was repeated 20 times in a row"},
     FindingKindInfo{FindingKind::kTimeOffset, "time_offset",
                     "innovations are proportional to the predicted rate: the clock of this or of "
                     "another sensor is off"},

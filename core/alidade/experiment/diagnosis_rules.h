@@ -23,9 +23,9 @@ inline std::string ElementPrefix(const InnovationView& view, std::size_t k) {
   return view.dof() == 1 ? "" : "element " + std::to_string(k) + ": ";
 }
 
-/// Returns ` (near the factor between mm and m, ...)` if the ratio is near the factor between two
-/// units, otherwise "".
-std::string UnitHint(double ratio);
+/// Returns ` (near the factor between mm and m, ...)` if the ratio is near the factor between the
+/// unit and another, otherwise "". The unit "" stands for any unit.
+std::string UnitHint(double ratio, const std::string& unit);
 
 // Errors that exceed the noise by far. These rules need only a few measurements.
 std::optional<Finding> TestTimeUnit(const InnovationView& view);

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -16,31 +18,35 @@ namespace {
 struct UnitFactor {
   double factor;
   const char* meaning;
+  std::array<std::string_view, 3> units;  ///< units of the quantities to which the factor applies
 };
 constexpr UnitFactor kUnitFactors[] = {
-    {1e3, "the factor between mm and m, or between ms and s"},
-    {180.0 / std::numbers::pi, "the factor between degrees and rad"},
-    {3.6, "the factor between km/h and m/s"},
-    {1e9, "the factor between ns and s"},
-    {1e6, "the factor between um and m, or between us and s"},
-    {3.28084, "the factor between feet and m"},
-    {60.0, "the factor between minutes and s"},
+    {1e3, "the factor between mm and m, or between ms and s", {"m", "m/s", "s"}},
+    {100.0, "the factor between cm and m", {"m", "m/s"}},
+    {180.0 / std::numbers::pi, "the factor between degrees and rad", {"rad", "rad/s"}},
+    {3.6, "the factor between km/h and m/s", {"m/s"}},
+    {1e9, "the factor between ns and s", {"s"}},
+    {1e6, "the factor between um and m, or between us and s", {"m", "s"}},
+    {3.28084, "the factor between feet and m", {"m"}},
+    {60.0, "the factor between minutes and s", {"s"}},
 };
 
 /// Returns the factor f for which |ratio| is nearest to f or 1 / f, or null if none is near. A
 /// large factor may differ by e^0.35, because the measured quantity may differ from its prediction
-/// too. A small factor must be exact. `with_small` admits small factors.
-const UnitFactor* NearestFactor(double ratio, bool with_small) {
+/// too. A small factor must be exact. `with_small` admits small factors. `unit` is the unit of the
+/// quantity; "" admits all factors.
+const UnitFactor* NearestFactor(double ratio, bool with_small, std::string_view unit = "") {
   constexpr double kLargeFactor = 20.0, kLargeTolerance = 0.35, kSmallTolerance = 0.05;
   const UnitFactor* nearest = nullptr;
   double smallest = kLargeTolerance;
-  for (const UnitFactor& unit : kUnitFactors) {
-    const double distance = std::abs(std::abs(std::log(ratio)) - std::log(unit.factor));
-    const bool is_large = unit.factor > kLargeFactor;
+  for (const UnitFactor& candidate : kUnitFactors) {
+    if (!unit.empty() && std::ranges::count(candidate.units, unit) == 0) continue;
+    const double distance = std::abs(std::abs(std::log(ratio)) - std::log(candidate.factor));
+    const bool is_large = candidate.factor > kLargeFactor;
     if ((!is_large && (!with_small || distance > kSmallTolerance)) || !(distance < smallest)) {
       continue;
     }
-    nearest = &unit;
+    nearest = &candidate;
     smallest = distance;
   }
   return nearest;
@@ -195,9 +201,9 @@ SwapEffect MedianEffectOfSwap(const InnovationView& view, std::size_t a, std::si
 
 }  // namespace
 
-std::string UnitHint(double ratio) {
-  const UnitFactor* const unit = NearestFactor(ratio, false);
-  return unit ? std::string(" (near ") + unit->meaning + ')' : "";
+std::string UnitHint(double ratio, const std::string& unit) {
+  const UnitFactor* const factor = NearestFactor(ratio, false, unit);
+  return factor ? std::string(" (near ") + factor->meaning + ')' : "";
 }
 
 std::optional<Finding> TestTimeUnit(const InnovationView& view) {
@@ -262,7 +268,7 @@ std::optional<Finding> TestDomain(const InnovationView& view) {
 std::optional<Finding> TestRejections(const InnovationView& view) {
   constexpr std::size_t kMinRows = 5, kMaxInARow = 10;
   constexpr const char* kRemedy =
-      "; check the prior, the units, the noise of the sensor and the process noise";
+      "; check the prior, the units, the noise of the sensor, the process noise and the gate";
   const double share = view.rejected_share();
   if (IsMostlyRejected(view) && view.size() >= kMinRows) {
     return MakeFinding(
@@ -296,25 +302,29 @@ std::optional<Finding> TestSwap(const InnovationView& view) {
 
 std::optional<Finding> TestStuck(const InnovationView& view) {
   constexpr std::size_t kMinRepetitions = 20;
-  const std::vector<double>& z = view.series().z;
-  const std::ptrdiff_t size = view.series().ambient;
-  std::size_t longest = 0, current = 0;
-  double since_s = 0.0;
-  for (std::size_t i = 1; i < view.size(); ++i) {
-    const auto row = z.begin() + static_cast<std::ptrdiff_t>(i) * size;
-    const bool is_same = view.series().landmarks[i] < 0 && std::equal(row, row + size, row - size);
-    current = is_same ? current + 1 : 0;
-    if (current <= longest) continue;
-    longest = current;
-    since_s = view.time_s(i - current);
+  const InnovationSeries& series = view.series();
+  const auto size = static_cast<std::size_t>(series.ambient);
+  for (std::size_t element = 0; element < size; ++element) {
+    std::size_t longest = 0, current = 0;
+    double since_s = 0.0;
+    for (std::size_t i = 1; i < view.size(); ++i) {
+      const double* const z = &series.z[i * size + element];
+      const bool is_same = series.landmarks[i] < 0 && z[0] == *(z - size);
+      current = is_same ? current + 1 : 0;
+      if (current <= longest) continue;
+      longest = current;
+      since_s = view.time_s(i - current);
+    }
+    // A sensor that always measures the same, such as zero velocity, is not stuck.
+    if (longest < kMinRepetitions || longest + 1 == view.size()) continue;
+    return MakeFinding(FindingKind::kStuck, view, static_cast<double>(longest),
+                       (size == 1 ? "" : "element " + std::to_string(element) + " of ") +
+                           "the measurement at " + RoundedText(since_s, 6) + " s was repeated " +
+                           std::to_string(longest) +
+                           " times without a change: the sensor is stuck, or its resolution is "
+                           "coarser than its noise; leave out these measurements");
   }
-  // A sensor that always measures the same, such as zero velocity, is not stuck.
-  if (longest < kMinRepetitions || longest + 1 == view.size()) return {};
-  return MakeFinding(FindingKind::kStuck, view, static_cast<double>(longest),
-                     "the measurement at " + RoundedText(since_s, 6) + " s was repeated " +
-                         std::to_string(longest) +
-                         " times without a change: the sensor is stuck, or its resolution is "
-                         "coarser than its noise; leave out these measurements");
+  return {};
 }
 
 }  // namespace alidade::internal

@@ -13,16 +13,19 @@ InnovationSeries::InnovationSeries(const SensorBinding& binding)
       is_angle(static_cast<std::size_t>(dof), 0),
       has_robust_loss(binding.loss.kind != LossKind::kNone),
       has_landmark_prior(binding.model->inverse().prior_size > 0) {
-  units.assign(static_cast<std::size_t>(ambient), binding.model->measurement().unit);
-  binding.model->measurement().geometry.ForEachPart(
-      [&](const Geometry& part, int ambient_offset, int tangent_offset) {
-        if (part.ambient != part.tangent) return;
-        for (int i = 0; i < part.tangent; ++i) {
-          const auto element = static_cast<std::size_t>(tangent_offset + i);
-          z_index[element] = ambient_offset + i;
-          is_angle[element] = part.is_angle() ? 1 : 0;
-        }
-      });
+  const Space& measured = binding.model->measurement();
+  std::size_t part_index = 0;
+  measured.geometry.ForEachPart([&](const Geometry& part, int ambient_offset, int tangent_offset) {
+    const bool has_parts = !measured.part_units.empty();
+    const std::string& unit = has_parts ? measured.part_units[part_index++] : measured.unit;
+    units.insert(units.end(), static_cast<std::size_t>(part.ambient), unit);
+    if (part.ambient != part.tangent) return;
+    for (int i = 0; i < part.tangent; ++i) {
+      const auto element = static_cast<std::size_t>(tangent_offset + i);
+      z_index[element] = ambient_offset + i;
+      is_angle[element] = part.is_angle() ? 1 : 0;
+    }
+  });
 }
 
 void InnovationSeries::Add(Timestamp timestamp, const MeasurementReport& measurement) {

@@ -54,6 +54,8 @@ class InnovationView {
   }
   bool is_angle(std::size_t k) const { return series_->is_angle[k] != 0; }
   const std::string& unit(std::size_t k) const { return series_->units[z_index(k)]; }
+  /// Returns the unit of element k of r. Elements without an element of z are angles.
+  std::string innovation_unit(std::size_t k) const { return has_z(k) ? unit(k) : "rad"; }
 
   /// Returns the index of the frame of measurement i. frame_count() is the number of frames.
   std::size_t frame(std::size_t i) const { return frames_[i]; }

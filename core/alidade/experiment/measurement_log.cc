@@ -6,6 +6,8 @@
 namespace alidade {
 namespace {
 
+constexpr std::int64_t kMinFrames = 20;
+
 bool IsUsed(const MeasurementReport& measurement) { return InfoOf(measurement.outcome).is_used; }
 
 }  // namespace
@@ -28,6 +30,7 @@ void MeasurementLog::Add(Timestamp timestamp, const UpdateReport& report) {
     AddUse(timestamp, measurement);
   }
   if (report.stale) return;
+  if (first_frame_ == kNoTimestamp) first_frame_ = timestamp;
   last_frame_ = timestamp;
   if (std::ranges::none_of(report.measurements(), IsUsed)) return;
   if (used_frames_++ == 0) {
@@ -53,7 +56,6 @@ void MeasurementLog::AddUse(Timestamp timestamp, const MeasurementReport& measur
 }
 
 std::optional<MeasurementLog::Gap> MeasurementLog::longest_gap() const {
-  constexpr std::int64_t kMinFrames = 20;
   if (used_frames_ < kMinFrames) return std::nullopt;
   Gap gap = longest_;
   if (last_frame_ - last_used_ > gap.end - gap.start) gap = {last_used_, last_frame_};
@@ -62,6 +64,18 @@ std::optional<MeasurementLog::Gap> MeasurementLog::longest_gap() const {
                       static_cast<double>(used_frames_ - 1);
   if (static_cast<double>(gap.end - gap.start) < kLongGap * mean) return std::nullopt;
   return gap;
+}
+
+std::optional<MeasurementLog::Gap> MeasurementLog::FinalGap(std::size_t sensor) const {
+  constexpr double kSmallestShare = 0.1;
+  const InnovationSeries& series = innovations_[sensor];
+  if (series.frames < kMinFrames) return std::nullopt;
+  const double gap = static_cast<double>(last_frame_ - series.last);
+  const double mean =
+      static_cast<double>(series.last - series.first) / (static_cast<double>(series.frames) - 1.0);
+  const double run = static_cast<double>(last_frame_ - first_frame_);
+  if (gap < std::max(kLongGap * mean, kSmallestShare * run)) return std::nullopt;
+  return Gap{series.last, last_frame_};
 }
 
 }  // namespace alidade

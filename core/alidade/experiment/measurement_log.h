@@ -44,6 +44,10 @@ class MeasurementLog {
   /// last frame; nullopt unless it is at least kLongGap times the mean interval between frames with
   /// a used measurement.
   std::optional<Gap> longest_gap() const;
+  /// Returns the time from the last measurement of a sensor, with any outcome, to the last frame;
+  /// nullopt unless it is at least kLongGap times the mean interval between the measurements of the
+  /// sensor, and at least a tenth of the run.
+  std::optional<Gap> FinalGap(std::size_t sensor) const;
 
  private:
   void AddUse(Timestamp timestamp, const MeasurementReport& measurement);
@@ -52,8 +56,8 @@ class MeasurementLog {
   std::vector<InnovationSeries> innovations_;
   std::int64_t used_frames_ = 0;  ///< frames with a used measurement
   Timestamp first_used_ = kNoTimestamp, last_used_ = kNoTimestamp;
-  Timestamp last_frame_ = kNoTimestamp;  ///< last frame, with or without a used measurement
-  Gap longest_ = {};                     ///< longest time between two frames with one
+  Timestamp first_frame_ = kNoTimestamp, last_frame_ = kNoTimestamp;  ///< of all frames
+  Gap longest_ = {};  ///< longest time between two frames with one
 };
 
 }  // namespace alidade

@@ -248,7 +248,7 @@ std::optional<Finding> TestElements(const InnovationView& view) {
     const bool is_wrong = std::abs(std::log(factor)) > std::log(kMinFactor);
     if (!is_wrong || scale.Test(1.0) == ScaleTest::kPassed) continue;
     list += (list.empty() ? "" : ", ") + RoundedText(factor, 3) + " for element " +
-            std::to_string(k) + UnitHint(factor);
+            std::to_string(k) + UnitHint(factor, view.innovation_unit(k));
     if (std::abs(std::log(factor)) > std::abs(std::log(worst))) worst = factor;
   }
   if (list.empty() || !(largest > kMinContrast * smallest)) return {};
@@ -256,8 +256,8 @@ std::optional<Finding> TestElements(const InnovationView& view) {
                      "the ratio of the innovations to their predicted size depends on the element: "
                      "it is " +
                          list +
-                         "; multiply the sigma of each of these elements by its ratio, and check "
-                         "its unit");
+                         "; multiply the sigma of each of these elements by its ratio and check "
+                         "its unit, or change the process noise");
 }
 
 std::optional<Finding> TestTimeOffset(const InnovationView& view) {
@@ -328,7 +328,8 @@ std::optional<Finding> TestScaleOfNis(const InnovationView& view) {
   const bool is_large = test == ScaleTest::kTooLarge;
   const FindingKind kind = is_large ? FindingKind::kOverconfident : FindingKind::kUnderconfident;
   const std::string size = "innovations are " + RoundedText(factor, 3) +
-                           " times as large as predicted" + UnitHint(factor);
+                           " times as large as predicted" +
+                           (view.dof() == 1 ? UnitHint(factor, view.innovation_unit(0)) : "");
   if (TestElements(view)) {
     return MakeFinding(kind, view, factor, size + "; this ratio depends on the element");
   }

@@ -14,6 +14,9 @@ namespace {
 using internal::RoundedText;
 
 constexpr std::int64_t kMinSamples = 20;
+/// Probabilities p of TestScale for a mean NEES: without and with a finding about the innovations. A
+/// finding and a large NEES hardly ever occur together by chance.
+constexpr double kAlone = 8e-7, kBesideFinding = 5e-3;
 
 /// Returns the verdict `state` for the first event that satisfies `is_cause`.
 template <class Predicate>
@@ -59,8 +62,8 @@ IndependentCount IndependentValues(const NeesSeries& series, double mean) {
   return {.count = count};
 }
 
-/// Returns the verdict of the NEES that is farthest from 1.
-Verdict FromNees(std::span<const NeesSeries> owners) {
+/// Returns the verdict of the NEES that is farthest from 1. TestScale has the probability p.
+Verdict FromNees(std::span<const NeesSeries> owners, double p) {
   Verdict verdict;
   verdict.state = VerdictState::kConsistent;
   verdict.basis = VerdictBasis::kNees;
@@ -70,7 +73,7 @@ Verdict FromNees(std::span<const NeesSeries> owners) {
     if (std::ssize(owner.values) < kMinSamples) continue;
     const double mean = Mean(owner.values);
     const IndependentCount independent = IndependentValues(owner, mean);
-    const ScaleTest test = TestScale(mean, owner.dof, independent.count);
+    const ScaleTest test = TestScale(mean, owner.dof, independent.count, p);
     means +=
         (means.empty() ? "" : ", ") + owner.owner + ' ' + RoundedText(mean, 3) + independent.reason;
     if (test == ScaleTest::kPassed) continue;
@@ -143,7 +146,12 @@ Verdict VerdictOf(const VerdictFacts& facts) {
     return verdict;
   }
   if (const auto rejected = FromRejections(facts.sensors)) return *rejected;
-  Verdict verdict = facts.nees.empty() ? WithoutTruth(facts) : FromNees(facts.nees);
+  const auto is_used = [](const SensorUse& use) { return use.used > 0; };
+  if (!facts.sensors.empty() && std::ranges::none_of(facts.sensors, is_used)) {
+    return {.because = "no measurement was used"};
+  }
+  const double p = facts.findings.empty() ? kAlone : kBesideFinding;
+  Verdict verdict = facts.nees.empty() ? WithoutTruth(facts) : FromNees(facts.nees, p);
   const bool is_wrong =
       verdict.basis == VerdictBasis::kNees && verdict.state != VerdictState::kConsistent;
   if (is_wrong) return verdict;
@@ -168,8 +176,13 @@ std::optional<VerdictState> VerdictStateOf(std::string_view name) {
 
 Verdict ComputeVerdict(const VerdictFacts& facts) {
   Verdict verdict = VerdictOf(facts);
-  if (std::ranges::find(facts.events, EventKind::kDigitsLost, &Event::kind) != facts.events.end()) {
-    verdict.because += "; sigmas may be wrong by rounding (event digits_lost)";
+  for (const EventKind kind :
+       {EventKind::kUnused, EventKind::kNoMeasurement, EventKind::kDigitsLost}) {
+    const auto event = std::ranges::find(facts.events, kind, &Event::kind);
+    if (event == facts.events.end()) continue;
+    verdict.because += kind == EventKind::kDigitsLost
+                           ? "; sigmas may be wrong by rounding (event digits_lost)"
+                           : "; " + event->text;
   }
   return verdict;
 }

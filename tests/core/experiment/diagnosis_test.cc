@@ -336,13 +336,21 @@ TEST(Diagnose, ComparesTheFirstMeasurementWithThePriorToFindAUnit) {
 // also the ratio of two usual values of sigma.
 TEST(UnitHint, NamesALargeFactorBetweenTwoUnits) {
   const std::string metres = " (near the factor between mm and m, or between ms and s)";
-  EXPECT_EQ(internal::UnitHint(1000.0), metres);
-  EXPECT_EQ(internal::UnitHint(1.0 / 720.0), metres);
-  EXPECT_EQ(internal::UnitHint(690.0), "");
-  EXPECT_EQ(internal::UnitHint(50.0), " (near the factor between degrees and rad)");
-  EXPECT_EQ(internal::UnitHint(1e9), " (near the factor between ns and s)");
-  EXPECT_EQ(internal::UnitHint(3.6), "");
-  EXPECT_EQ(internal::UnitHint(1.0), "");
+  EXPECT_EQ(internal::UnitHint(1000.0, ""), metres);
+  EXPECT_EQ(internal::UnitHint(1.0 / 720.0, ""), metres);
+  EXPECT_EQ(internal::UnitHint(690.0, ""), "");
+  EXPECT_EQ(internal::UnitHint(50.0, ""), " (near the factor between degrees and rad)");
+  EXPECT_EQ(internal::UnitHint(1e9, ""), " (near the factor between ns and s)");
+  EXPECT_EQ(internal::UnitHint(3.6, ""), "");
+  EXPECT_EQ(internal::UnitHint(1.0, ""), "");
+}
+
+TEST(UnitHint, NamesOnlyFactorsOfTheUnit) {
+  EXPECT_EQ(internal::UnitHint(60.0, "rad"), " (near the factor between degrees and rad)");
+  EXPECT_EQ(internal::UnitHint(60.0, "s"), " (near the factor between minutes and s)");
+  EXPECT_EQ(internal::UnitHint(60.0, "m"), "");
+  EXPECT_EQ(internal::UnitHint(90.0, "m"), " (near the factor between cm and m)");
+  EXPECT_EQ(internal::UnitHint(60.0, "px"), "");
 }
 
 TEST(Diagnose, NamesTheFactorBetweenTwoUnitsOfTheSizeOfInnovations) {
@@ -506,8 +514,9 @@ TEST(Diagnose, ASensorThatAlwaysMeasuresTheSameIsNotStuck) {
   EXPECT_TRUE(Has(MakeSeries(1, 100, Repeated(1, 100)), FindingKind::kStuck));
 }
 
-TEST(Diagnose, ASensorIsStuckOnlyIfAllElementsAreRepeated) {
-  EXPECT_FALSE(Has(MakeSeries(2, 100, Repeated(40, 80)), FindingKind::kStuck));
+TEST(Diagnose, NamesTheElementThatIsStuck) {
+  const Finding finding = FindingOf(MakeSeries(2, 100, Repeated(40, 80)), FindingKind::kStuck);
+  EXPECT_TRUE(Contains(finding.text, "element 0 of the measurement at 4 s")) << finding.text;
 }
 
 // Measurements of several landmarks alternate, and a landmark may have a constant direction.

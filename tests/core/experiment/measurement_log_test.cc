@@ -71,5 +71,35 @@ TEST(MeasurementLog, FindsTheLongestTimeWithoutAUsedMeasurement) {
   EXPECT_EQ(log.longest_gap()->end, last + 31 * kStep);
 }
 
+TEST(MeasurementLog, FindsASensorWithoutMeasurementsAtTheEnd) {
+  Problem problem = OneSensor();
+  problem.sensors.push_back(problem.sensors[0]);
+  MeasurementLog log(problem);
+  Timestamp timestamp = 0;
+  const auto add_frame = [&](bool both) {
+    UpdateReport report;
+    report.Add(0, Outcome::kAccepted, -1, 1);
+    if (both) report.Add(1, Outcome::kGated, -1, 1);
+    log.Add(timestamp += kStep, report);
+  };
+  for (int i = 0; i < 20; ++i) add_frame(true);
+  const Timestamp last = timestamp;
+  for (int i = 0; i < 29; ++i) add_frame(false);
+  EXPECT_FALSE(log.FinalGap(1)) << "29 time steps";
+  add_frame(false);
+  ASSERT_TRUE(log.FinalGap(1));
+  EXPECT_EQ(log.FinalGap(1)->start, last);
+  EXPECT_FALSE(log.FinalGap(0));
+  EXPECT_FALSE(log.longest_gap());
+}
+
+// The run has 400 time steps before the gap, so 30 time steps are less than a tenth of it.
+TEST(MeasurementLog, IgnoresAGapAtTheEndThatIsShortForTheRun) {
+  MeasurementLog log(OneSensor());
+  for (int i = 0; i < 400; ++i) AddFrame(log, i * kStep, Outcome::kAccepted);
+  for (int i = 400; i < 435; ++i) AddFrame(log, i * kStep, std::nullopt);
+  EXPECT_FALSE(log.FinalGap(0));
+}
+
 }  // namespace
 }  // namespace alidade

@@ -123,6 +123,31 @@ TEST(Verdict, CountsTheRejectionsAtTheEnd) {
   EXPECT_EQ(verdict.since, 3);
 }
 
+TEST(Verdict, IsNotTestedIfNoMeasurementWasUsed) {
+  const NeesSeries nees = MakeNees(1.0, 200);
+  const SensorUse unused{.sensor = "gnss"}, used{.sensor = "imu", .used = 1};
+  const Event event{kNoTimestamp, EventKind::kUnused, "sensor 'gnss' had no measurement"};
+  VerdictFacts facts{.events = {&event, 1}, .sensors = {&unused, 1}, .nees = {&nees, 1}};
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kNotTested);
+  EXPECT_EQ(ComputeVerdict(facts).because,
+            "no measurement was used; sensor 'gnss' had no measurement");
+  const std::vector<SensorUse> both = {unused, used};
+  facts.sensors = both;
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kConsistent);
+  EXPECT_TRUE(ComputeVerdict(facts).because.ends_with("; sensor 'gnss' had no measurement"));
+}
+
+// A mean NEES of 6 is not significant if all values count as one: chi2(1 - 8e-7; 3) / 3 = 10.4. It
+// is significant beside a finding: chi2(0.995; 3) / 3 = 4.3.
+TEST(Verdict, IsStricterIfThereIsAFinding) {
+  const NeesSeries slow{"target", 3.0, std::vector<double>(100, 6.0)};
+  VerdictFacts facts{.nees = {&slow, 1}};
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kConsistent);
+  const Finding finding{FindingKind::kCorrelated, "gnss", "successive innovations", 0.5};
+  facts.findings = {&finding, 1};
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kOverconfident);
+}
+
 TEST(Verdict, UsesTheInnovationsWithoutTruth) {
   const Finding finding{FindingKind::kOverconfident, "gnss", "innovations are 2 times as large",
                         2.0};

@@ -41,22 +41,24 @@ TEST(ParameterTestsText, MarksAParameterWithTheSameEffectAsAnAlternative) {
             "'estimators.ekf.overrides.sensors.camera.time_offset_s=X'\n"
             "  sensors.mocap.time_offset_s is 0, but -0.00468 has almost the same effect as "
             "sensors.camera.time_offset_s (|z| = 30.2, log-likelihood +456); try --set "
-            "'estimators.ekf.overrides.sensors.mocap.time_offset_s=X'\n");
+            "'estimators.ekf.overrides.sensors.mocap.time_offset_s=X'\n"
+            "  change only the first of these parameters, and repeat the diagnosis\n");
 }
 
 TEST(ParameterTestsText, NamesOnlyTheLargestScoreIfThereIsNoAlarm) {
   const ParameterTests tests = {"ekf", {}, {TestOf("a", -2.5, 1.0), TestOf("b", 1.0, 1.0)}};
   EXPECT_EQ(TextOf(tests),
             "parameters of ekf:\n"
-            "  no other value of a parameter explains the innovations better: the largest |z| of 2 "
-            "parameters is 2.5 (a); a wrong number would exceed 4.5\n");
+            "  no other value of a parameter explains the innovations significantly better: the "
+            "largest |z| of 2 parameters is 2.5 (a), which is below the threshold of 4.5\n");
 }
 
 TEST(ParameterTestsText, SaysIfNothingWasTested) {
   ParameterTest constant = TestOf("a", 0.0, 0.0);
   constant.not_tested = "the standard deviation is 0";
   EXPECT_EQ(TextOf({"ekf", {}, {constant}}),
-            "parameters of ekf:\n  no parameter could be tested\n");
+            "parameters of ekf:\n  no parameter could be tested\n"
+            "  a: not tested, because the standard deviation is 0\n");
   EXPECT_EQ(TextOf({"ekf", "it is a batch", {}}),
             "parameters of ekf:\n  not tested: it is a batch\n");
 }

@@ -21,9 +21,9 @@ InnovationSeries::InnovationSeries(const SensorBinding& binding)
     units.insert(units.end(), static_cast<std::size_t>(part.ambient), unit);
     if (part.ambient != part.tangent) return;
     for (int i = 0; i < part.tangent; ++i) {
-      const auto element = static_cast<std::size_t>(tangent_offset + i);
-      z_index[element] = ambient_offset + i;
-      is_angle[element] = part.is_angle() ? 1 : 0;
+      const int element = tangent_offset + i;
+      z_index[static_cast<std::size_t>(element)] = ambient_offset + i;
+      is_angle[static_cast<std::size_t>(element)] = part.is_angle() ? 1 : 0;
     }
   });
 }

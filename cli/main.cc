@@ -6,6 +6,7 @@
 #include <exception>
 #include <new>
 
+#include "alidade/base/text.h"
 #include "command.h"
 #include "console.h"
 #include "usage.h"
@@ -37,22 +38,11 @@ class Format : public CLI::Formatter {
   }
 };
 
-/// Returns `text` as one word of a shell, quoted if necessary.
-std::string ShellQuoted(const std::string& text) {
-  constexpr const char* kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
-      "%+,-./:=@_";
-  if (!text.empty() && text.find_first_not_of(kPlain) == text.npos) return text;
-  std::string quoted = "'";
-  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + '\'';
-}
-
 using ArgumentList = std::vector<std::string>;
 
 std::string CommandLine(const ArgumentList& arguments) {
   std::string line = "alidade";
-  for (const std::string& argument : arguments) line += ' ' + ShellQuoted(argument);
+  for (const std::string& argument : arguments) line += ' ' + internal::ShellWord(argument);
   return line;
 }
 

@@ -10,12 +10,6 @@
 
 namespace alidade::bench {
 
-inline double Mean(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (const double v : values) sum += v;
-  return sum / static_cast<double>(values.size());
-}
-
 /// Returns the 95 % bootstrap interval of the mean of n independent values [Efron1993, ch. 13]. The
 /// ends of the interval are the 2.5 and 97.5 % quantiles of the means of `draws` samples of n
 /// values, drawn with replacement. For differences of two methods on the same series, this is the

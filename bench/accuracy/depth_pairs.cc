@@ -25,7 +25,6 @@
 
 namespace {
 
-using alidade::bench::Mean;
 using alidade::bench::PairSeries;
 using Settings = std::vector<std::pair<std::string, std::string>>;
 using Names = std::vector<std::string>;
@@ -137,11 +136,6 @@ Choice ChooseAll(const Bench& bench, const Names& series) {
   return choice;
 }
 
-double Median(std::vector<double> values) {
-  std::ranges::sort(values);
-  return alidade::Quantile(values, 0.5);
-}
-
 /// Table that is printed row by row. Medians() prints the last row.
 class Table {
  public:
@@ -158,7 +152,7 @@ class Table {
   }
   void Medians() const {
     std::vector<double> row;
-    for (const auto& column : values_) row.push_back(Median(column));
+    for (const auto& column : values_) row.push_back(alidade::Median(column));
     Print("median", row);
   }
 
@@ -197,7 +191,7 @@ std::vector<double> Report(const char* title, const Bench& bench, const Settings
 void PrintDifference(const char* title, const std::vector<double>& differences) {
   const alidade::Interval interval = alidade::bench::BootstrapOfMean(differences);
   std::printf("%s: mean of log(fused / line) over %zu series %+.3f, 95 %% [%+.3f, %+.3f]\n", title,
-              differences.size(), Mean(differences), interval.low, interval.high);
+              differences.size(), alidade::Mean(differences), interval.low, interval.high);
 }
 
 /// Prints the standard deviation of the white noise of both sensors, and the drift of the scale.

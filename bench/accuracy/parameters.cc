@@ -5,8 +5,8 @@
 //   accuracy_parameters examples [SEEDS [SEEDS_OF_FAULTS]]
 //
 // Tests the parameters of consistent filters with the seeds 4001, 4002, ... Then plants one wrong
-// parameter in each run, with the seeds 3001, 3002, ..., and counts the runs in which its test is an
-// alarm, and is the first one or an alternative to the first one. Prints both tables of
+// parameter in each run, with the seeds 3001, 3002, ..., and counts the runs in which its test is
+// an alarm, and is the first one or an alternative to the first one. Prints both tables of
 // docs/diagnose.md. Defaults: 50 and 20 seeds. The exit code is 1 if a consistent filter raises an
 // alarm.
 #include <algorithm>

@@ -86,6 +86,28 @@ TEST_F(Cli, UsageErrorsExitWithTwoAndNameHelp) {
   }
 }
 
+TEST_F(Cli, AnOptionWithOneValueIsRefusedIfItIsRepeated) {
+  const Outcome seeds = Call({"run", "config.yaml", "--seed", "1", "--seed", "2"});
+  EXPECT_EQ(seeds.code, 2);
+  EXPECT_EQ(seeds.err,
+            "error: the option --seed is given more than once (seed of the source; replaces the "
+            "seed in the config)\nsee `alidade run --help`\n");
+  const Outcome folders = Call({"run", "config.yaml", "-o", "a", "--output=b"});
+  EXPECT_EQ(folders.code, 2);
+  EXPECT_TRUE(Contains(folders.err, "the option --output is given more than once")) << folders.err;
+  EXPECT_FALSE(Exists("a") || Exists("b"));
+}
+
+// A flag has no value, so a repetition has no effect. The last value of a key is used.
+TEST_F(Cli, FlagsAndSettingsMayBeRepeated) {
+  const Outcome run =
+      Call({"run", "config.yaml", "-o", "out", "--no-figures", "--no-figures", "--quiet", "--quiet",
+            "--set", "source.seed=5", "--set", "source.seed=6"});
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_TRUE(Contains(Read("out/config.resolved.yaml"), "seed: 6")) << run.err;
+  EXPECT_FALSE(Contains(Read("out/config.resolved.yaml"), "seed: 5"));
+}
+
 TEST_F(Cli, UnderscoresInTheNameOfAnOptionMeanHyphens) {
   EXPECT_EQ(Call({"run", "config.yaml", "-o", "a", "--allow_outside",
                   "--plugin_path=" ALIDADE_BINARY_DIR "/lib/alidade/plugins"})

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "support/program.h"
+#include "support/terminal.h"
 
 namespace alidade {
 namespace {
@@ -68,6 +69,31 @@ TEST_F(DiagnoseCli, NamesTheSensorsThatItCannotTest) {
   EXPECT_EQ(sensors[0].Text(), "stereo");
 }
 
+/// Returns a copy of a row of a CSV file in which the cell of column `name` is `value`.
+std::string WithCell(const std::string& header, std::string row, std::string_view name,
+                     const std::string& value) {
+  const auto index = std::count(header.begin(), header.begin() + header.find(name), ',');
+  std::size_t begin = 0;
+  for (auto i = index; i > 0; --i) begin = row.find(',', begin) + 1;
+  return row.replace(begin, row.find(',', begin) - begin, value);
+}
+
+TEST_F(DiagnoseCli, IgnoresTheNumbersOfMeasurementsThatNoUpdateUsed) {
+  const Outcome before = Diagnose({});
+  const std::string text = Read("out/ekf/innovations.csv");
+  const std::size_t first = text.find('\n') + 1;
+  const std::string header = text.substr(0, first),
+                    row = text.substr(first, text.find('\n', first) + 1 - first);
+  const std::string not_pd =
+                        WithCell(header, WithCell(header, row, "s0", "nan"), "outcome", "not_pd"),
+                    too_large =
+                        WithCell(header, WithCell(header, row, "nis", "inf"), "outcome", "gated");
+  Write("out/ekf/innovations.csv", header + not_pd + too_large + text.substr(first));
+  const Outcome after = Call({"diagnose", "out"});
+  EXPECT_EQ(after.code, 0) << after.err;
+  EXPECT_EQ(after.out, before.out);
+}
+
 TEST_F(DiagnoseCli, RefusesAFolderThatIsNotAFinishedRun) {
   const Outcome missing = Call({"diagnose", "missing"});
   EXPECT_EQ(missing.code, 66);
@@ -79,8 +105,9 @@ TEST_F(DiagnoseCli, RefusesAFolderThatIsNotAFinishedRun) {
   EXPECT_TRUE(Contains(changed.err, "the column 'landmark' is missing")) << changed.err;
 }
 
-/// Settings that simulate a target with the models of the filter, and a stereo sensor with twice the
-/// noise that the filter assumes. A gate would reject the largest innovations, and shorten the step.
+/// Settings that simulate a target with the models of the filter, and a stereo sensor with twice
+/// the noise that the filter assumes. A gate would reject the largest innovations, and shorten the
+/// step.
 const Arguments kNoisyStereo = {
     "source={type: models, duration_s: 5, overrides: {sensors: {stereo: {sigma_px: 2}}}}",
     "state.target.initial.depth={mean: 5, sigma: 0.02}",
@@ -101,9 +128,36 @@ TEST_F(DiagnoseCli, WhyNamesTheWrongSigmaAndASettingThatRemovesTheAlarm) {
   EXPECT_NEAR(sigma, 2.0, 0.4);
   Arguments corrected = kNoisyStereo;
   corrected.push_back("estimators.ekf.overrides.sensors.stereo.sigma_px=" + std::to_string(sigma));
-  EXPECT_TRUE(Contains(Diagnose(corrected, {"--why"}).out,
-                       "no other value of a parameter explains the innovations better"))
+  EXPECT_TRUE(
+      Contains(Diagnose(corrected, {"--why"}).out,
+               "no other value of a parameter explains the innovations significantly better"))
       << Read("stdout");
+}
+
+// The gate rejects the largest innovations of the assumed sigma, so one step is too short.
+TEST_F(DiagnoseCli, WhyRepeatsTheStepIfAGateRejectsTheLargestInnovations) {
+  Arguments gated = kNoisyStereo;
+  gated.back() = "estimators.ekf.gate=0.999";
+  const Outcome outcome = Diagnose(gated, {"--why", "--json"});
+  const Config json = Config::FromText(outcome.out, "stdout");
+  const auto tested = json.root().At("estimators").At("ekf").At("parameters").At("tested").Items();
+  ASSERT_FALSE(tested.empty()) << outcome.err;
+  EXPECT_EQ(tested[0].At("key").Text(), "sensors.stereo.sigma_px");
+  EXPECT_EQ(tested[0].At("value").Number(), 1.0);
+  EXPECT_NEAR(tested[0].At("estimate").Number(), 2.0, 0.25);
+}
+
+TEST_F(DiagnoseCli, WhyShowsTheRunsOfTheFilterOnATerminal) {
+  ASSERT_EQ(Diagnose(kNoisyStereo).code, 0);
+  const testing::Terminal terminal;
+  before_ = "TERM=xterm; export TERM; exec 2>" + terminal.name();
+  ASSERT_EQ(Call({"diagnose", "out", "--why"}).code, 0);
+  // One run reads the data, one has the numbers of the config, and two test each of five numbers.
+  // The first number is an alarm, whose estimate then needs four runs for each step.
+  const std::string shown = terminal.Text();
+  EXPECT_TRUE(Contains(shown, "\r1 of 12 runs of the filter, 8 %")) << shown;
+  ASSERT_EQ(Call({"diagnose", "out", "--why", "--json"}).code, 0);
+  EXPECT_EQ(terminal.Text(), "");
 }
 
 TEST_F(DiagnoseCli, WhyListsEveryParameterInJson) {

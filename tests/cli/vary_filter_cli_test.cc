@@ -48,6 +48,13 @@ TEST_F(VaryFilterCli, ChangesTheEstimatorsOnly) {
   EXPECT_LT(nees[2], 0.8 * nees[1]);
   EXPECT_EQ(Json("filter/sweep.json").root().At("scope").Text(), "estimators");
   EXPECT_TRUE(Contains(Read("filter/table.md"), "for each value, for the estimators only"));
+  // Each table has the counts of the verdicts that occurred.
+  EXPECT_TRUE(Contains(filter.out, "\n       runs used  lost  overconfident  consistent  "))
+      << filter.out;
+  EXPECT_TRUE(Contains(filter.out, "\n0.05           8     0              0           8  "));
+  EXPECT_TRUE(
+      Contains(Read("filter/table.md"), "| runs used | lost | overconfident | consistent |"))
+      << Read("filter/table.md");
 
   // The value of the config gives the same results as a sweep without a varied key.
   ASSERT_EQ(Sweep("plain", {}).code, 0);
@@ -86,7 +93,7 @@ TEST_F(VaryFilterCli, RefusesKeysThatAnEstimatorCannotOverride) {
   EXPECT_TRUE(Contains(source.err, "an estimator cannot override 'source'")) << source.err;
   const Outcome two = Sweep("out", {"--vary-filter", "a=1,2", "--vary", "b=1,2"});
   EXPECT_EQ(two.code, 2);
-  EXPECT_TRUE(Contains(two.err, "--vary")) << two.err;
+  EXPECT_EQ(two.err, "error: --vary excludes --vary-filter\nsee `alidade sweep --help`\n");
 }
 
 TEST_F(VaryFilterCli, MergedShardsEqualTheWholeSweep) {

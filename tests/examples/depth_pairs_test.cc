@@ -96,8 +96,8 @@ TEST(Bootstrap, IsTheIntervalOfTheMean) {
   std::vector<double> values(400);
   for (double& v : values) v = 5.0 + 2.0 * random.Normal();
   const Interval interval = bench::BootstrapOfMean(values);
-  EXPECT_NEAR(interval.low, bench::Mean(values) - 0.196, 0.02);
-  EXPECT_NEAR(interval.high, bench::Mean(values) + 0.196, 0.02);
+  EXPECT_NEAR(interval.low, Mean(values) - 0.196, 0.02);
+  EXPECT_NEAR(interval.high, Mean(values) + 0.196, 0.02);
 }
 
 // The mean of two draws from {0, 1} is 0, 1/2 or 1, with probabilities 1/4, 1/2 and 1/4.
@@ -138,7 +138,7 @@ TEST(DepthPairs, FusedIsNoWorseThanTheLineOnTheReportedSeries) {
     differences.push_back(
         std::log(result.estimators.at(0).metrics.at("rmse:target.depth@blind") / line));
   }
-  EXPECT_LE(bench::Mean(differences), 0.0);
+  EXPECT_LE(Mean(differences), 0.0);
   // If the whole interval were above 0, the filter would be significantly worse than the line.
   EXPECT_LT(bench::BootstrapOfMean(differences).low, 0.0);
 }

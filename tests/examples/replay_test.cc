@@ -158,19 +158,19 @@ TEST_P(Replay, GivesTheFiguresOfBefore) {
   Compare(recording.figures(), GetParam().name);
 }
 
-const ReplaySettings kSlamEstimators = {{"estimators.iekf.type", "iekf"}};
+const ReplaySettings kSlamEstimators = {{"estimators.iekf", "{type: iekf}"}};
 
 INSTANTIATE_TEST_SUITE_P(
     Examples, Replay,
-    ::testing::Values(Replayed{"05_depth_principled", "05_depth_principled/config.yaml", 10, {}},
-                      Replayed{
-                          "06_depth_poor_initial", "06_depth_poor_initial/config.yaml", 10, {}},
-                      Replayed{"07_depth_pairs", "07_depth_pairs/config.yaml", 5, {}},
-                      Replayed{"10_slam_scene", "10_slam_scene/config.yaml", 10, kSlamEstimators},
-                      Replayed{"15_slam_representations",
-                               "15_slam_representations/config.yaml",
-                               15,
-                               {{"source.max_frames", "120"}, {"estimators.iekf.type", "iekf"}}}),
+    ::testing::Values(
+        Replayed{"05_depth_principled", "05_depth_principled/config.yaml", 10, {}},
+        Replayed{"06_depth_poor_initial", "06_depth_poor_initial/config.yaml", 10, {}},
+        Replayed{"07_depth_pairs", "07_depth_pairs/config.yaml", 5, {}},
+        Replayed{"10_slam_scene", "10_slam_scene/config.yaml", 10, kSlamEstimators},
+        Replayed{"15_slam_representations",
+                 "15_slam_representations/config.yaml",
+                 15,
+                 {{"source.max_frames", "120"}, {"estimators.iekf", "{type: iekf}"}}}),
     [](const auto& instance) { return instance.param.name; });
 
 #if !defined(ALIDADE_WITHOUT_CERES)

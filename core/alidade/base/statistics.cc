@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <vector>
 
 #include "alidade/base/error.h"
@@ -101,13 +102,13 @@ Interval ConsistencyBounds(double dof, double n, double cut) {
   return {m * ChiSquareQuantile(0.025, nu) / nu, m * ChiSquareQuantile(0.975, nu) / nu};
 }
 
-ScaleTest TestScale(double mean, double dof, double n) {
-  constexpr double kProbability = 8e-7, kSmallestFactor = 1.15 * 1.15;
+ScaleTest TestScale(double mean, double dof, double n, double p) {
+  constexpr double kSmallestFactor = 1.15 * 1.15;
   const double nu = n * dof;
-  if (mean >= kSmallestFactor && mean > ChiSquareQuantile(1.0 - kProbability, nu) / nu) {
+  if (mean >= kSmallestFactor && mean > ChiSquareQuantile(1.0 - p, nu) / nu) {
     return ScaleTest::kTooLarge;
   }
-  if (mean <= 1.0 / kSmallestFactor && mean < ChiSquareQuantile(kProbability, nu) / nu) {
+  if (mean <= 1.0 / kSmallestFactor && mean < ChiSquareQuantile(p, nu) / nu) {
     return ScaleTest::kTooSmall;
   }
   return ScaleTest::kPassed;
@@ -133,15 +134,30 @@ Interval ShareInterval(std::int64_t successes, std::int64_t trials) {
   return {std::max(0.0, (centre - half) / (1.0 + z2)), std::min(1.0, (centre + half) / (1.0 + z2))};
 }
 
+double Median(std::vector<double> values) {
+  std::ranges::sort(values);
+  return Quantile(values, 0.5);
+}
+
+double Mean(std::span<const double> values) {
+  ALIDADE_EXPECTS(!values.empty());
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+double SquaredDeviation(std::span<const double> values) {
+  const double mean = Mean(values);
+  double sum = 0.0;
+  for (const double value : values) sum += (value - mean) * (value - mean);
+  return sum;
+}
+
 Spread SpreadOf(std::vector<double> values) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   std::erase_if(values, [](double value) { return std::isnan(value); });
   if (values.empty()) return {kNaN, kNaN, kNaN, kNaN};
-  std::sort(values.begin(), values.end());
-  double sum = 0.0;
-  for (const double value : values) sum += value;
-  return {sum / static_cast<double>(values.size()), Quantile(values, 0.05), Quantile(values, 0.5),
-          Quantile(values, 0.95)};
+  std::ranges::sort(values);
+  return {Mean(values), Quantile(values, 0.05), Quantile(values, 0.5), Quantile(values, 0.95),
+          values.size()};
 }
 
 }  // namespace alidade

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 namespace alidade {
@@ -35,10 +37,10 @@ Interval ConsistencyBounds(double dof, double n,
 /// Result of TestScale.
 enum class ScaleTest { kPassed, kTooLarge, kTooSmall };
 /// Tests whether the mean of n independent values of chi2(dof) / dof, such as NEES / dof, may be 1.
-/// The mean is too large if it exceeds chi2(1 - 8e-7, nu) / nu, nu = n dof, and is at least 1.15^2.
-/// It is too small if it is below chi2(8e-7, nu) / nu and at most 1.15^-2. n need not be an
-/// integer. The probability of a false alarm is 1.6e-6.
-ScaleTest TestScale(double mean, double dof, double n);
+/// The mean is too large if it exceeds chi2(1 - p, nu) / nu, nu = n dof, and is at least 1.15^2. It
+/// is too small if it is below chi2(p, nu) / nu and at most 1.15^-2. n need not be an integer. The
+/// probability of a false alarm is 2 p.
+ScaleTest TestScale(double mean, double dof, double n, double p = 8e-7);
 
 /// Returns the 95 % interval of a probability p, of which k successes in n > 0 trials are known
 /// [Wilson1927]. With z = 1.96 and f = k / n:
@@ -52,12 +54,20 @@ Interval ShareInterval(std::int64_t successes, std::int64_t trials);
 ///   x[k] + (h - k) (x[k + 1] - x[k]),   h = (n - 1) q,   k = floor h
 double Quantile(const std::vector<double>& ascending, double q);
 
+/// Returns the median. `values` must not be empty.
+double Median(std::vector<double> values);
+/// Returns the mean. `values` must not be empty.
+double Mean(std::span<const double> values);
+/// Returns the sum of squared deviations from the mean. `values` must not be empty.
+double SquaredDeviation(std::span<const double> values);
+
 /// Mean and quantiles of a set of values. p05, p50 and p95 are the 5 %, 50 % and 95 % quantiles.
 struct Spread {
   double mean = 0.0, p05 = 0.0, p50 = 0.0, p95 = 0.0;
+  std::size_t count = 0;  ///< number of values that are not NaN
 };
-/// Returns the spread of the values that are not NaN. Every member is NaN if there are no such
-/// values.
+/// Returns the spread of the values that are not NaN. Without such values, the mean and quantiles
+/// are NaN.
 Spread SpreadOf(std::vector<double> values);
 
 }  // namespace alidade

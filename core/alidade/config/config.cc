@@ -229,15 +229,13 @@ std::vector<Step> ParseDotted(std::string_view dotted, const Place& place) {
 }
 
 /// Rejects a key below an entry that `root` does not contain, because the user names the entries of
-/// these maps, and a misspelt name would create a new entry. The keys `type` and `model` create an
-/// entry.
+/// these maps, and a misspelt name would create a new entry.
 void RejectNewEntry(const ConfigTree& root, const std::vector<Step>& steps, const Place& place,
                     std::string_view dotted) {
   constexpr std::pair<const char*, const char*> kMaps[] = {
       {"estimators", "estimator"}, {"sensors", "sensor"}, {"state", "state entry"}};
   for (const auto& [key, noun] : kMaps) {
     if (steps.size() < 3 || steps[0].name != key || steps[1].name.empty()) continue;
-    if (steps.size() == 3 && (steps[2].name == "type" || steps[2].name == "model")) continue;
     const ConfigTree* const map = Child(root, key);
     const std::string& name = steps[1].name;
     if (map != nullptr && Child(*map, name) != nullptr) continue;

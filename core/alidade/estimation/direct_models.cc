@@ -26,6 +26,7 @@ Space SpaceOf(const Quantity& quantity, const Geometry& geometry, const std::vec
   space.flags = quantity.flags;
   for (const Space& part : parts) {
     space.parts.push_back(part.name);
+    space.part_units.push_back(part.unit);
     for (const std::string& name : ColumnNames(part.name, part)) space.elements.push_back(name);
   }
   if (parts.empty()) space.elements = internal::ElementsOf(quantity.elements, geometry);

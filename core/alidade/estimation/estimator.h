@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/base/enum_table.h"
 #include "alidade/base/timestamp.h"
 #include "alidade/estimation/event.h"
 #include "alidade/estimation/frame.h"
@@ -41,8 +42,9 @@ enum class Outcome {
 /// Properties of an outcome.
 struct OutcomeInfo {
   Outcome outcome;
-  const char* name;     ///< name in files
-  const char* meaning;  ///< description in the documentation
+  const char* name;      ///< name in files
+  const char* meaning;   ///< description in the documentation
+  bool is_used = false;  ///< the measurement initialised or corrected a block
   /// Whether the outcome counts as a rejection for rejection recovery. An outcome `not_finite`
   /// counts only if h was computed.
   bool is_rejection = false;
@@ -54,10 +56,12 @@ struct OutcomeInfo {
 inline constexpr std::array kOutcomes = {
     OutcomeInfo{.outcome = Outcome::kAccepted,
                 .name = "accepted",
-                .meaning = "an update used the measurement"},
+                .meaning = "an update used the measurement",
+                .is_used = true},
     OutcomeInfo{.outcome = Outcome::kInitialised,
                 .name = "initialised",
                 .meaning = "the measurement initialised a block; no update used it",
+                .is_used = true,
                 .is_initialisation = true},
     OutcomeInfo{.outcome = Outcome::kGated,
                 .name = "gated",
@@ -97,14 +101,8 @@ inline constexpr std::array kOutcomes = {
                 .meaning = "the measurement was not processed, because the estimator had already "
                            "ended"},
 };
-static_assert(
-    [] {
-      for (std::size_t i = 0; i < kOutcomes.size(); ++i) {
-        if (kOutcomes[i].outcome != static_cast<Outcome>(i)) return false;
-      }
-      return kOutcomes.back().outcome == Outcome::kEnded;
-    }(),
-    "kOutcomes must have one entry for each Outcome, in the order of Outcome");
+static_assert(internal::HasEntryForEach(kOutcomes, &OutcomeInfo::outcome, Outcome::kEnded),
+              "kOutcomes must have one entry for each Outcome, in the order of Outcome");
 /// Returns the properties of an outcome.
 inline const OutcomeInfo& InfoOf(Outcome outcome) {
   return kOutcomes[static_cast<std::size_t>(outcome)];

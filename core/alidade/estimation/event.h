@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <string>
 
+#include "alidade/base/enum_table.h"
 #include "alidade/base/timestamp.h"
 
 namespace alidade {
@@ -87,8 +88,10 @@ inline constexpr std::array kEventKinds = {
                   "units"},
     EventKindInfo{EventKind::kUnused, "unused", EventSeverity::kWarning,
                   "the estimator used no measurement of this sensor; the text states the reason"},
-    EventKindInfo{EventKind::kNoMeasurement, "no_measurement", EventSeverity::kWarning,
-                  "the estimator used no measurement of any sensor for a long time"},
+    EventKindInfo{
+        EventKind::kNoMeasurement, "no_measurement", EventSeverity::kWarning,
+        "the estimator used no measurement for a long time, or a sensor had none at the end of the "
+        "run"},
     EventKindInfo{EventKind::kTruth, "truth", EventSeverity::kWarning,
                   "the source provides ground truth, but no frame contained a true value"},
     EventKindInfo{EventKind::kUnobservable, "unobservable", EventSeverity::kWarning,
@@ -163,14 +166,9 @@ inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kEstimatorSpecific, "estimator_specific", EventSeverity::kInfo,
                   "an event of an estimator plugin to which no other kind applies"},
 };
-static_assert(
-    [] {
-      for (std::size_t i = 0; i < kEventKinds.size(); ++i) {
-        if (kEventKinds[i].kind != static_cast<EventKind>(i)) return false;
-      }
-      return kEventKinds.back().kind == EventKind::kEstimatorSpecific;
-    }(),
-    "kEventKinds must have one entry for each EventKind, in the order of EventKind");
+static_assert(internal::HasEntryForEach(kEventKinds, &EventKindInfo::kind,
+                                        EventKind::kEstimatorSpecific),
+              "kEventKinds must have one entry for each EventKind, in the order of EventKind");
 
 /// Returns the entry of a kind.
 inline const EventKindInfo& InfoOf(EventKind kind) {

@@ -49,7 +49,7 @@ struct EkfOptions {
   /// Number of consecutive rejections of one sensor before the first recovery. The next four follow
   /// after 2, 4, 8 and 16 times this number.
   int rejection_recovery_after = 20;
-  /// Time without an accepted measurement of a rejected sensor, in s, before the first recovery.
+  /// Time since the first of consecutive rejections of one sensor, in s, before the first recovery.
   /// The next four follow after 2, 4, 8 and 16 times this time. It suits sensors of a low rate.
   double rejection_recovery_after_s = std::numeric_limits<double>::infinity();
   int max_covariance_repairs = 10;  ///< the filter ends if one more repair is needed

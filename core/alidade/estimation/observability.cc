@@ -168,9 +168,9 @@ class RowSpace {
   Eigen::Index rank_ = 0;
 };
 
-/// Adds the rows H phi of a sensor. Their columns are scaled by the prior sigma. Adds no rows if h
+/// Adds the rows H phi of a sensor. Their columns are scaled by the prior sigma. Returns false if h
 /// is not defined at the values.
-void AddSensorRows(const SensorBinding& sensor, const double* known, const Problem& problem,
+bool AddSensorRows(const SensorBinding& sensor, const double* known, const Problem& problem,
                    const Trajectory& t, const Eigen::MatrixXd& phi, RowSpace& rows) {
   const Eigen::Map<const Eigen::RowVectorXd> scale(t.scale.data(), phi.cols());
   const int m = sensor.model->measurement().geometry.tangent;
@@ -190,7 +190,7 @@ void AddSensorRows(const SensorBinding& sensor, const double* known, const Probl
   std::vector<double> z(static_cast<std::size_t>(sensor.model->measurement().geometry.ambient));
   if (sensor.model->Linearise(roles.data(), z.data(), data.data(), strides.data(), known) !=
       Status::kOk) {
-    return;
+    return false;
   }
   Eigen::MatrixXd h_phi = Eigen::MatrixXd::Zero(m, phi.cols());
   for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
@@ -198,28 +198,34 @@ void AddSensorRows(const SensorBinding& sensor, const double* known, const Probl
     if (role.block < 0 || role.mode == RoleMode::kKnown) continue;
     const int column = t.columns[static_cast<std::size_t>(role.block)];
     if (column < 0) continue;
-    if (!j[i].allFinite()) return;
+    if (!j[i].allFinite()) return false;
     h_phi += j[i] * phi.middleRows(column, j[i].cols());
   }
   for (Eigen::Index i = 0; i < m; ++i) rows.Add(h_phi.row(i).cwiseProduct(scale));
+  return true;
 }
 
 /// Adds the rows of every sensor. A sensor that needs known numbers is evaluated several times,
-/// with random known numbers whose magnitude equals that of the state.
-void AddObservationRows(const Problem& problem, const Trajectory& t, const Eigen::MatrixXd& phi,
+/// with random known numbers whose magnitude equals that of the state. Returns whether h of every
+/// sensor was defined at least once.
+bool AddObservationRows(const Problem& problem, const Trajectory& t, const Eigen::MatrixXd& phi,
                         Random& random, RowSpace& rows) {
   constexpr int kMeasurements = 4;
   double magnitude = 1.0;
   for (const std::vector<double>& value : t.values) {
     for (const double element : value) magnitude = std::max(magnitude, 2.0 * std::abs(element));
   }
+  bool are_defined = true;
   for (const SensorBinding& sensor : problem.sensors) {
+    bool is_defined = false;
     std::vector<double> known(static_cast<std::size_t>(sensor.model->known_size()));
     for (int i = 0; i < (known.empty() ? 1 : kMeasurements); ++i) {
       for (double& number : known) number = magnitude * random.Normal();
-      AddSensorRows(sensor, known.data(), problem, t, phi, rows);
+      is_defined |= AddSensorRows(sensor, known.data(), problem, t, phi, rows);
     }
+    are_defined &= is_defined;
   }
+  return are_defined;
 }
 
 /// Adds one row for each element with an exact prior and for each coordinate of a known landmark.
@@ -354,13 +360,15 @@ std::vector<std::vector<std::string>> internal::UnobservableDirections(
   // If a step does not increase the rank, later steps usually do not increase the rank either,
   // because state and inputs are generic. The loop ends only after two such steps in a row, because
   // the rank may increase again when the trajectory turns.
+  bool are_defined = false;
   for (int idle = 0; idle < kIdleSteps && rows.rank() < n;) {
     const Eigen::Index previous_rank = rows.rank();
-    AddObservationRows(problem, t, phi, known, rows);
+    are_defined |= AddObservationRows(problem, t, phi, known, rows);
     idle = rows.rank() == previous_rank ? idle + 1 : 0;
     if (!Advance(problem, kStep, changing, t, phi)) break;
   }
-  if (rows.rank() == n) return {};
+  // A sensor that is not defined near the prior may determine the missing directions.
+  if (rows.rank() == n || !are_defined) return {};
   Eigen::MatrixXd null_space = rows.Complement();
   std::vector<std::vector<std::string>> directions;
   if (landmark_problem && RemoveScale(*landmark_problem, start, null_space))

@@ -199,7 +199,7 @@ BlockId DeterminedBlock(const FilterState& f, const SensorBinding& sensor) {
 bool Recovery::IsDue(const FilterState& f, const Rejections& rejections) const {
   if (rejections.attempts > kMaxAttempts) return false;
   const double factor = std::ldexp(1.0, rejections.attempts);
-  const double rejected_s = 1e-9 * static_cast<double>(f.timestamp - rejections.first);
+  const double rejected_s = Seconds(f.timestamp - rejections.first);
   return rejections.count >= factor * options_.rejection_recovery_after ||
          rejected_s >= factor * options_.rejection_recovery_after_s;
 }

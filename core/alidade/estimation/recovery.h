@@ -19,7 +19,8 @@ namespace alidade::internal {
 class Recovery {
  public:
   static constexpr int kMaxAttempts = 5;
-  /// Number of consecutive rejections of a sensor at which the event `mostly_rejected` occurs.
+  /// Number of consecutive rejections from which a sensor is mostly rejected (event
+  /// `mostly_rejected`, and the verdict).
   static constexpr int kMostlyRejected = 20;
 
   explicit Recovery(const Problem& problem, const EkfOptions& options)
@@ -31,10 +32,7 @@ class Recovery {
   void RepairCovariance(FilterState& f, UpdateMethod& method);
   /// Counts the outcome of a measurement, and recovers if an attempt is due.
   void Count(FilterState& f, PendingMeasurement& pending, UpdateMethod& method) {
-    const Outcome outcome = pending.report->outcome;
-    if (outcome != Outcome::kAccepted && outcome != Outcome::kInitialised) {
-      return CountRejection(f, pending, method);
-    }
+    if (!InfoOf(pending.report->outcome).is_used) return CountRejection(f, pending, method);
     sensors_[static_cast<std::size_t>(pending.sensor)] = {};
     f.health.out_of_domain[static_cast<std::size_t>(pending.sensor)] = 0;
   }

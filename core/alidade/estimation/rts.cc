@@ -149,7 +149,10 @@ void RtsSmoother::Smooth(const Emit& emit) {
     const Workspace::Use use(work);
     const Workspace::Matrix projected = pass.Project(frame->directions, work);  // D [mu A]
     smoothed.values() = frame->x;
-    smoothed.Retract(projected.col(0).data(), frame->x);
+    if (!smoothed.Retract(projected.col(0).data(), frame->x)) {
+      engine_->f.health.ended = true;
+      throw Error(ExitCode::kDiverged, "a smoothed estimate is not finite");
+    }
     LowerTriangle p = smoothed.covariance().lower();
     p.setZero();
     internal::AddOuterProduct(p, projected.rightCols(projected.cols() - 1), 1.0);

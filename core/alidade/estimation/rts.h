@@ -48,8 +48,7 @@ class RtsSmoother : public Estimator {
   /// `jacobian_at: measurement`, or landmarks.
   static constexpr EstimatorCapabilities kCapabilities = {.recovery = true};
 
-  /// Throws Error kBadConfig if
-  /// `problem` needs more than kCapabilities.
+  /// Throws Error kBadConfig if `problem` needs more than kCapabilities.
   RtsSmoother(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams);
   explicit RtsSmoother(const Problem& problem, const EkfOptions& options = {})
       : RtsSmoother(problem, options, problem.streams) {}

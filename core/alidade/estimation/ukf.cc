@@ -229,7 +229,7 @@ void UkfEquations::ReportNonlinearity(FilterState& f, const PendingMeasurement& 
     const auto plus = points.row(k).head(n), minus = points.row(k).tail(n);
     const double variance =
         0.5 * w * (plus - minus).squaredNorm() + pending.R[static_cast<std::size_t>(k * (m + 1))];
-    ratio = std::max(ratio, w * (plus + minus).lpNorm<1>() / std::sqrt(variance));
+    ratio = std::max(ratio, w * std::abs((plus + minus).sum()) / std::sqrt(variance));
   }
   if (!(ratio > kLargestRatio)) return;
   is_nonlinear_[sensor] = true;

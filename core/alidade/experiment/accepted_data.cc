@@ -13,7 +13,7 @@ std::vector<bool> UsedMeasurements(int sensor, const UpdateReport& report) {
   std::vector<bool> used;
   for (const MeasurementReport& entry : report.measurements()) {
     if (entry.sensor != sensor) continue;
-    used.push_back(entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised);
+    used.push_back(InfoOf(entry.outcome).is_used);
   }
   return used;
 }

@@ -2,6 +2,7 @@
 #include "alidade/experiment/diagnosis.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "alidade/experiment/diagnosis_rules.h"
@@ -11,7 +12,7 @@ namespace {
 
 using internal::InnovationView;
 
-using Rule = internal::MaybeFinding (*)(const InnovationView& view);
+using Rule = std::optional<Finding> (*)(const InnovationView& view);
 
 constexpr Rule kGrossErrorRules[] = {
     internal::TestTimeUnit,   internal::TestUnit, internal::TestPrior, internal::TestDomain,
@@ -24,7 +25,7 @@ constexpr Rule kNoiseRules[] = {internal::TestNoiseModel, internal::TestTails,
 void Apply(std::span<const Rule> rules, const InnovationView& view,
            std::vector<Finding>& findings) {
   for (const Rule rule : rules) {
-    if (internal::MaybeFinding finding = rule(view)) findings.push_back(*std::move(finding));
+    if (std::optional<Finding> finding = rule(view)) findings.push_back(*std::move(finding));
   }
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/base/enum_table.h"
 #include "alidade/experiment/innovation_series.h"
 
 namespace alidade {
@@ -54,7 +55,7 @@ inline constexpr std::array kFindingKinds = {
     FindingKindInfo{FindingKind::kSwapped, "swapped",
                     "two elements of the measurement appear to be exchanged"},
     FindingKindInfo{FindingKind::kStuck, "stuck",
-                    "the same measurement was repeated many times in a row"},
+                    "an element of the measurement was repeated 20 times in a row"},
     FindingKindInfo{FindingKind::kTimeOffset, "time_offset",
                     "innovations are proportional to the predicted rate: the clock of this or of "
                     "another sensor is off"},
@@ -75,14 +76,8 @@ inline constexpr std::array kFindingKinds = {
     FindingKindInfo{FindingKind::kUnderconfident, "underconfident",
                     "innovations are smaller than predicted"},
 };
-
 static_assert(
-    [] {
-      for (std::size_t i = 0; i < kFindingKinds.size(); ++i) {
-        if (kFindingKinds[i].kind != static_cast<FindingKind>(i)) return false;
-      }
-      return kFindingKinds.back().kind == FindingKind::kUnderconfident;
-    }(),
+    internal::HasEntryForEach(kFindingKinds, &FindingKindInfo::kind, FindingKind::kUnderconfident),
     "kFindingKinds must have one entry for each FindingKind, in the order of FindingKind");
 
 /// Finding about the innovations of one sensor.

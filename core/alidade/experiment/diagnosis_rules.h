@@ -11,8 +11,6 @@
 /// nullopt. diagnosis.cc lists the rules.
 namespace alidade::internal {
 
-using MaybeFinding = std::optional<Finding>;
-
 /// Returns a finding with the text `SENSOR: text`.
 inline Finding MakeFinding(FindingKind kind, const InnovationView& view, double statistic,
                            const std::string& text) {
@@ -25,26 +23,26 @@ inline std::string ElementPrefix(const InnovationView& view, std::size_t k) {
   return view.dof() == 1 ? "" : "element " + std::to_string(k) + ": ";
 }
 
-/// Returns ` (near the factor between mm and m, ...)` if the ratio is near the factor between two
-/// units, otherwise "".
-std::string UnitHint(double ratio);
+/// Returns ` (near the factor between mm and m, ...)` if the ratio is near the factor between the
+/// unit and another, otherwise "". The unit "" stands for any unit.
+std::string UnitHint(double ratio, const std::string& unit);
 
 // Errors that exceed the noise by far. These rules need only a few measurements.
-MaybeFinding TestTimeUnit(const InnovationView& view);
-MaybeFinding TestUnit(const InnovationView& view);
-MaybeFinding TestPrior(const InnovationView& view);
-MaybeFinding TestDomain(const InnovationView& view);
-MaybeFinding TestRejections(const InnovationView& view);
-MaybeFinding TestSwap(const InnovationView& view);
-MaybeFinding TestStuck(const InnovationView& view);
+std::optional<Finding> TestTimeUnit(const InnovationView& view);
+std::optional<Finding> TestUnit(const InnovationView& view);
+std::optional<Finding> TestPrior(const InnovationView& view);
+std::optional<Finding> TestDomain(const InnovationView& view);
+std::optional<Finding> TestRejections(const InnovationView& view);
+std::optional<Finding> TestSwap(const InnovationView& view);
+std::optional<Finding> TestStuck(const InnovationView& view);
 
 // Errors of the size of the noise. These rules need kMinDiagnosedFrames frames.
-MaybeFinding TestNoiseModel(const InnovationView& view);
-MaybeFinding TestTails(const InnovationView& view);
-MaybeFinding TestElements(const InnovationView& view);
-MaybeFinding TestTimeOffset(const InnovationView& view);
-MaybeFinding TestBias(const InnovationView& view);
-MaybeFinding TestCorrelation(const InnovationView& view);
-MaybeFinding TestScaleOfNis(const InnovationView& view);
+std::optional<Finding> TestNoiseModel(const InnovationView& view);
+std::optional<Finding> TestTails(const InnovationView& view);
+std::optional<Finding> TestElements(const InnovationView& view);
+std::optional<Finding> TestTimeOffset(const InnovationView& view);
+std::optional<Finding> TestBias(const InnovationView& view);
+std::optional<Finding> TestCorrelation(const InnovationView& view);
+std::optional<Finding> TestScaleOfNis(const InnovationView& view);
 
 }  // namespace alidade::internal

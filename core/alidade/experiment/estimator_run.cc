@@ -73,10 +73,11 @@ std::string EstimatorRun::HandleFailures(const UpdateReport& report) {
 void EstimatorRun::AddEstimate(std::size_t k, const FrameWithSegments& frame, const State& state,
                                const UpdateReport& report, const RunOptions& options) {
   has_estimate = true;
+  measurement_log.Add(frame.frame.timestamp, report);
   if (!needs_reference) {
     metrics.Add(frame.frame, frame.in_segment, state, report);
   } else {
-    metrics.AddReport(frame.frame.timestamp, frame.in_segment, report);
+    metrics.AddReport(frame.in_segment, report);
     if (!report.stale) {
       estimates.push_back({k, ValuesOf(state, spec.problem.layout.blocks().size())});
     }
@@ -148,7 +149,8 @@ std::vector<EstimatorRun> CreateRuns(Experiment& experiment) {
     const int index = static_cast<int>(runs.size());
     Metrics metrics(spec, index == reference ? std::vector<StreamInfo>() : truths,
                     experiment.segments);
-    runs.push_back({spec, index, std::move(metrics), InitialResult(spec, experiment)});
+    runs.push_back({spec, index, std::move(metrics), MeasurementLog(spec.problem),
+                    InitialResult(spec, experiment)});
     runs.back().needs_reference = reference >= 0;
   }
   return runs;

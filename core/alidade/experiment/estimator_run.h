@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "alidade/estimation/rollback.h"
+#include "alidade/experiment/measurement_log.h"
 #include "alidade/experiment/metrics.h"
 #include "alidade/experiment/reference_metrics.h"
 #include "alidade/experiment/run.h"
@@ -18,6 +19,7 @@ struct EstimatorRun {
   EstimatorSpec& spec;
   int index = 0;  ///< index in Experiment::estimators
   Metrics metrics;
+  MeasurementLog measurement_log;
   EstimatorResult result;
   bool finished = false;  ///< true if the estimator could not continue
   /// True if the estimator diverged in a processed frame. Always false for an offline estimator.
@@ -47,7 +49,8 @@ struct EstimatorRun {
   /// Disables the sensors whose model failed in the frame of `report`. Returns the reason why the
   /// run must end, or "" if the run can continue.
   std::string HandleFailures(const UpdateReport& report);
-  /// Adds the estimate of frame `k` to the metrics and passes it to the observers of the run.
+  /// Adds the estimate of frame `k` to the metrics and the measurement log, and passes it to the
+  /// observers of the run.
   void AddEstimate(std::size_t k, const FrameWithSegments& frame, const State& state,
                    const UpdateReport& report, const RunOptions& options);
   /// Adds the events to the result and the log. Counts all events `input_stale` in `stale_inputs`.

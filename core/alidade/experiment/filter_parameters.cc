@@ -14,8 +14,8 @@ namespace {
 
 using Parameters = std::vector<FilterParameter>;
 
-/// Keys of an entry whose values are not standard deviations of a model. The standard deviation of a
-/// prior affects only the first measurements.
+/// Keys of an entry whose values are not standard deviations of a model. The standard deviation of
+/// a prior affects only the first measurements.
 constexpr std::array<std::string_view, 7> kOtherKeys = {
     "initial", "roles", "blocks", "input", "loss", "outlier_rejection", "time_offset_s"};
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -16,47 +18,51 @@ namespace {
 struct UnitFactor {
   double factor;
   const char* meaning;
+  std::array<std::string_view, 3> units;  ///< units of the quantities to which the factor applies
 };
 constexpr UnitFactor kUnitFactors[] = {
-    {1e3, "the factor between mm and m, or between ms and s"},
-    {180.0 / std::numbers::pi, "the factor between degrees and rad"},
-    {3.6, "the factor between km/h and m/s"},
-    {1e9, "the factor between ns and s"},
-    {1e6, "the factor between um and m, or between us and s"},
-    {3.28084, "the factor between feet and m"},
-    {60.0, "the factor between minutes and s"},
+    {1e3, "the factor between mm and m, or between ms and s", {"m", "m/s", "s"}},
+    {100.0, "the factor between cm and m", {"m", "m/s"}},
+    {180.0 / std::numbers::pi, "the factor between degrees and rad", {"rad", "rad/s"}},
+    {3.6, "the factor between km/h and m/s", {"m/s"}},
+    {1e9, "the factor between ns and s", {"s"}},
+    {1e6, "the factor between um and m, or between us and s", {"m", "s"}},
+    {3.28084, "the factor between feet and m", {"m"}},
+    {60.0, "the factor between minutes and s", {"s"}},
 };
 
 /// Returns the factor f for which |ratio| is nearest to f or 1 / f, or null if none is near. A
 /// large factor may differ by e^0.35, because the measured quantity may differ from its prediction
-/// too. A small factor must be exact. `with_small` admits small factors.
-const UnitFactor* NearestFactor(double ratio, bool with_small) {
+/// too. A small factor must be exact. `with_small` admits small factors. `unit` is the unit of the
+/// quantity; "" admits all factors.
+const UnitFactor* NearestFactor(double ratio, bool with_small, std::string_view unit = "") {
   constexpr double kLargeFactor = 20.0, kLargeTolerance = 0.35, kSmallTolerance = 0.05;
   const UnitFactor* nearest = nullptr;
   double smallest = kLargeTolerance;
-  for (const UnitFactor& unit : kUnitFactors) {
-    const double distance = std::abs(std::abs(std::log(ratio)) - std::log(unit.factor));
-    const bool is_large = unit.factor > kLargeFactor;
+  for (const UnitFactor& candidate : kUnitFactors) {
+    if (!unit.empty() && std::ranges::count(candidate.units, unit) == 0) continue;
+    const double distance = std::abs(std::abs(std::log(ratio)) - std::log(candidate.factor));
+    const bool is_large = candidate.factor > kLargeFactor;
     if ((!is_large && (!with_small || distance > kSmallTolerance)) || !(distance < smallest)) {
       continue;
     }
-    nearest = &unit;
+    nearest = &candidate;
     smallest = distance;
   }
   return nearest;
 }
 
-MaybeFinding UnitFinding(const InnovationView& view, std::size_t k, double ratio,
-                         const std::string& measurement, const std::string& meaning) {
+std::optional<Finding> UnitFinding(const InnovationView& view, std::size_t k, double ratio,
+                                   const std::string& measurement, const std::string& meaning) {
   return MakeFinding(FindingKind::kUnit, view, ratio,
-                     ElementPrefix(view, k) + measurement + " is " + RoundedText(ratio, 3) +
+                     ElementPrefix(view, k) + measurement + " is " + RoundedText(ratio, 4) +
                          " times its prediction, which is " + meaning +
                          "; check the unit of the data, of the prior and of the parameters");
 }
 
 /// Compares the first measurement, to which no update has adapted the state yet, with the
 /// prediction by the prior. If the prediction may be 0, a large ratio has no meaning.
-MaybeFinding TestFirstRatio(const InnovationView& view) {
+std::optional<Finding> TestFirstRatio(const InnovationView& view) {
   for (std::size_t k = 0; k < view.dof(); ++k) {
     if (!view.has_z(k)) continue;
     const double ratio = view.z(0, k) / view.h(0, k);
@@ -83,7 +89,7 @@ Rows FarRows(const InnovationView& view) {
 }
 
 /// Compares the ratios z / h of several measurements, which have to agree.
-MaybeFinding TestMedianRatio(const InnovationView& view) {
+std::optional<Finding> TestMedianRatio(const InnovationView& view) {
   constexpr std::size_t kMinRatios = 3;
   constexpr double kLargeSpread = 0.3, kSmallSpread = 0.05;
   const Rows rows = FarRows(view);
@@ -101,7 +107,8 @@ MaybeFinding TestMedianRatio(const InnovationView& view) {
     const double spread = Median(distances);
     if (!(spread < kLargeSpread)) continue;
     if (median < 0.0) {
-      if (spread > kSmallSpread || std::abs(median + 1.0) > kSmallSpread) continue;
+      const bool is_opposite = spread <= kSmallSpread && std::abs(median + 1.0) <= kSmallSpread;
+      if (!is_opposite || view.is_angle(k)) continue;  // pi and -pi are the same angle
       return MakeFinding(FindingKind::kUnit, view, median,
                          ElementPrefix(view, k) +
                              "the measurement is -1 times its prediction; check the sign and the "
@@ -116,7 +123,7 @@ MaybeFinding TestMedianRatio(const InnovationView& view) {
 
 /// Detects a latitude and a longitude that are read as metres: they hardly vary, compared with
 /// sigma.
-MaybeFinding TestDegreesAsMetres(const InnovationView& view) {
+std::optional<Finding> TestDegreesAsMetres(const InnovationView& view) {
   constexpr std::size_t kMinSize = 10;
   constexpr double kMaxVariation = 0.01, kLimits[] = {90.0, 180.0};
   if (view.size() < kMinSize || view.dof() < 2) return {};
@@ -171,8 +178,8 @@ struct SwapEffect {
   double before, after;
 };
 SwapEffect EffectOfSwap(const InnovationView& view, std::size_t i, std::size_t a, std::size_t b) {
-  const double swapped_a = (view.z(i, b) - view.h(i, a)) / view.s(i, a);
-  const double swapped_b = (view.z(i, a) - view.h(i, b)) / view.s(i, b);
+  const double swapped_a = view.Difference(view.z(i, b), view.h(i, a), a) / view.s(i, a);
+  const double swapped_b = view.Difference(view.z(i, a), view.h(i, b), b) / view.s(i, b);
   return {std::hypot(view.u(i, a), view.u(i, b)) / std::numbers::sqrt2,
           std::hypot(swapped_a, swapped_b) / std::numbers::sqrt2};
 }
@@ -194,12 +201,12 @@ SwapEffect MedianEffectOfSwap(const InnovationView& view, std::size_t a, std::si
 
 }  // namespace
 
-std::string UnitHint(double ratio) {
-  const UnitFactor* const unit = NearestFactor(ratio, false);
-  return unit ? std::string(" (near ") + unit->meaning + ')' : "";
+std::string UnitHint(double ratio, const std::string& unit) {
+  const UnitFactor* const factor = NearestFactor(ratio, false, unit);
+  return factor ? std::string(" (near ") + factor->meaning + ')' : "";
 }
 
-MaybeFinding TestTimeUnit(const InnovationView& view) {
+std::optional<Finding> TestTimeUnit(const InnovationView& view) {
   constexpr double kLongStep_s = 10.0, kFarRatio = 20.0;
   const InnovationSeries& series = view.series();
   if (series.frames < 2) return {};
@@ -216,18 +223,18 @@ MaybeFinding TestTimeUnit(const InnovationView& view) {
                          "convert them to s");
 }
 
-MaybeFinding TestUnit(const InnovationView& view) {
+std::optional<Finding> TestUnit(const InnovationView& view) {
   if (view.size() == 0) return {};
-  if (MaybeFinding finding = TestDegreesAsMetres(view)) return finding;
+  if (std::optional<Finding> finding = TestDegreesAsMetres(view)) return finding;
   const bool is_prior_far = TestPrior(view).has_value();
   if (is_prior_far) {
-    if (MaybeFinding finding = TestFirstRatio(view)) return finding;
+    if (std::optional<Finding> finding = TestFirstRatio(view)) return finding;
   }
   if (!is_prior_far && !IsMostlyRejected(view) && !StartsFarOff(view)) return {};
   return TestMedianRatio(view);
 }
 
-MaybeFinding TestPrior(const InnovationView& view) {
+std::optional<Finding> TestPrior(const InnovationView& view) {
   constexpr double kFalseAlarm = 1e-6, kMaxRatio = 16.0;
   double count = 0.0, largest = 0.0;
   for (std::size_t i = 0; i < view.size() && view.frame(i) < kFirstFrames; ++i, ++count) {
@@ -246,7 +253,7 @@ MaybeFinding TestPrior(const InnovationView& view) {
                          "prior");
 }
 
-MaybeFinding TestDomain(const InnovationView& view) {
+std::optional<Finding> TestDomain(const InnovationView& view) {
   const InnovationSeries& series = view.series();
   const double share = static_cast<double>(series.out_of_domain) /
                        static_cast<double>(std::max<std::int64_t>(series.total, 1));
@@ -258,10 +265,10 @@ MaybeFinding TestDomain(const InnovationView& view) {
                          "lost; check the prior, the units and the times");
 }
 
-MaybeFinding TestRejections(const InnovationView& view) {
+std::optional<Finding> TestRejections(const InnovationView& view) {
   constexpr std::size_t kMinRows = 5, kMaxInARow = 10;
   constexpr const char* kRemedy =
-      "; check the prior, the units, the noise of the sensor and the process noise";
+      "; check the prior, the units, the noise of the sensor, the process noise and the gate";
   const double share = view.rejected_share();
   if (IsMostlyRejected(view) && view.size() >= kMinRows) {
     return MakeFinding(
@@ -275,7 +282,7 @@ MaybeFinding TestRejections(const InnovationView& view) {
                          " consecutive timestamps were rejected" + kRemedy);
 }
 
-MaybeFinding TestSwap(const InnovationView& view) {
+std::optional<Finding> TestSwap(const InnovationView& view) {
   constexpr double kMinGain = 5.0, kMaxAfter = 5.0;
   for (std::size_t a = 0; a < view.dof(); ++a) {
     for (std::size_t b = a + 1; b < view.dof(); ++b) {
@@ -293,27 +300,31 @@ MaybeFinding TestSwap(const InnovationView& view) {
   return {};
 }
 
-MaybeFinding TestStuck(const InnovationView& view) {
+std::optional<Finding> TestStuck(const InnovationView& view) {
   constexpr std::size_t kMinRepetitions = 20;
-  const std::vector<double>& z = view.series().z;
-  const auto size = static_cast<std::ptrdiff_t>(view.size() == 0 ? 0 : z.size() / view.size());
-  std::size_t longest = 0, current = 0;
-  double since_s = 0.0;
-  for (std::size_t i = 1; i < view.size(); ++i) {
-    const auto row = z.begin() + static_cast<std::ptrdiff_t>(i) * size;
-    const bool is_same = view.series().landmarks[i] < 0 && std::equal(row, row + size, row - size);
-    current = is_same ? current + 1 : 0;
-    if (current <= longest) continue;
-    longest = current;
-    since_s = view.time_s(i - current);
+  const InnovationSeries& series = view.series();
+  const auto size = static_cast<std::size_t>(series.ambient);
+  for (std::size_t element = 0; element < size; ++element) {
+    std::size_t longest = 0, current = 0;
+    double since_s = 0.0;
+    for (std::size_t i = 1; i < view.size(); ++i) {
+      const double* const z = &series.z[i * size + element];
+      const bool is_same = series.landmarks[i] < 0 && z[0] == *(z - size);
+      current = is_same ? current + 1 : 0;
+      if (current <= longest) continue;
+      longest = current;
+      since_s = view.time_s(i - current);
+    }
+    // A sensor that always measures the same, such as zero velocity, is not stuck.
+    if (longest < kMinRepetitions || longest + 1 == view.size()) continue;
+    return MakeFinding(FindingKind::kStuck, view, static_cast<double>(longest),
+                       (size == 1 ? "" : "element " + std::to_string(element) + " of ") +
+                           "the measurement at " + RoundedText(since_s, 6) + " s was repeated " +
+                           std::to_string(longest) +
+                           " times without a change: the sensor is stuck, or its resolution is "
+                           "coarser than its noise; leave out these measurements");
   }
-  // A sensor that always measures the same, such as zero velocity, is not stuck.
-  if (longest < kMinRepetitions || longest + 1 == view.size()) return {};
-  return MakeFinding(FindingKind::kStuck, view, static_cast<double>(longest),
-                     "the measurement at " + RoundedText(since_s, 6) + " s was repeated " +
-                         std::to_string(longest) +
-                         " times without a change: the sensor is stuck, or its resolution is "
-                         "coarser than its noise; leave out these measurements");
+  return {};
 }
 
 }  // namespace alidade::internal

@@ -10,29 +10,32 @@ InnovationSeries::InnovationSeries(const SensorBinding& binding)
       dof(binding.model->measurement().geometry.tangent),
       ambient(binding.model->measurement().geometry.ambient),
       z_index(static_cast<std::size_t>(dof), -1),
+      is_angle(static_cast<std::size_t>(dof), 0),
       has_robust_loss(binding.loss.kind != LossKind::kNone),
       has_landmark_prior(binding.model->inverse().prior_size > 0) {
-  units.assign(static_cast<std::size_t>(ambient), binding.model->measurement().unit);
-  binding.model->measurement().geometry.ForEachPart(
-      [&](const Geometry& part, int ambient_offset, int tangent_offset) {
-        if (part.ambient != part.tangent) return;
-        for (int i = 0; i < part.tangent; ++i) {
-          const int element = tangent_offset + i;
-          z_index[static_cast<std::size_t>(element)] = ambient_offset + i;
-        }
-      });
+  const Space& measured = binding.model->measurement();
+  std::size_t part_index = 0;
+  measured.geometry.ForEachPart([&](const Geometry& part, int ambient_offset, int tangent_offset) {
+    const bool has_parts = !measured.part_units.empty();
+    const std::string& unit = has_parts ? measured.part_units[part_index++] : measured.unit;
+    units.insert(units.end(), static_cast<std::size_t>(part.ambient), unit);
+    if (part.ambient != part.tangent) return;
+    for (int i = 0; i < part.tangent; ++i) {
+      const int element = tangent_offset + i;
+      z_index[static_cast<std::size_t>(element)] = ambient_offset + i;
+      is_angle[static_cast<std::size_t>(element)] = part.is_angle() ? 1 : 0;
+    }
+  });
 }
 
 void InnovationSeries::Add(Timestamp timestamp, const MeasurementReport& measurement) {
-  const bool is_stored =
-      measurement.outcome == Outcome::kAccepted || measurement.outcome == Outcome::kGated;
   const auto m = static_cast<std::size_t>(dof), a = static_cast<std::size_t>(ambient);
   ++total;
   out_of_domain += measurement.outcome == Outcome::kOutOfDomain;
   frames += timestamp != last;
   if (first == kNoTimestamp) first = timestamp;
   last = timestamp;
-  if (!is_stored || size() == kMaxSize || measurement.innovation.size() != m ||
+  if (!Stores(measurement.outcome) || size() == kMaxSize || measurement.innovation.size() != m ||
       measurement.s.size() != m * m || measurement.z.size() != a || measurement.h.size() != a ||
       !std::isfinite(measurement.nis)) {
     return;

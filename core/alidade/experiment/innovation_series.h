@@ -26,9 +26,9 @@ struct InnovationSeries {
   /// Index of the element of z that corresponds to each element of r, m. -1 for the elements of a
   /// rotation or a direction, which do not correspond to single elements of z.
   std::vector<int> z_index;
-  bool has_robust_loss = false;  ///< a robust loss reduces the weight of outliers
-  bool has_landmark_prior =
-      false;  ///< landmarks of the sensor start from a prior of their distance
+  std::vector<char> is_angle;       ///< whether an element of r is an angle in rad, m
+  bool has_robust_loss = false;     ///< a robust loss reduces the weight of outliers
+  bool has_landmark_prior = false;  ///< its landmarks start from a prior of their distance
 
   std::vector<Timestamp> timestamps;
   std::vector<std::int64_t> landmarks;  ///< -1: the sensor measures no landmark
@@ -45,8 +45,12 @@ struct InnovationSeries {
 
   InnovationSeries() = default;
   explicit InnovationSeries(const SensorBinding& binding);
-  /// Counts a measurement with any outcome. Stores it if it was accepted or gated and has a NIS,
-  /// unless the series is full.
+  /// Returns whether measurements with this outcome are stored.
+  static bool Stores(Outcome outcome) {
+    return outcome == Outcome::kAccepted || outcome == Outcome::kGated;
+  }
+  /// Counts a measurement with any outcome. Stores it if it was accepted or gated and has a finite
+  /// NIS, unless the series is full.
   void Add(Timestamp timestamp, const MeasurementReport& measurement);
 
   std::size_t size() const { return timestamps.size(); }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/experiment/innovation_view.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,11 +12,6 @@ namespace {
 
 /// Largest share of rejections that may be due to chance.
 constexpr double kChanceShare = 0.05;
-
-Eigen::VectorXd Centred(std::span<const double> values) {
-  const Eigen::VectorXd x = Eigen::VectorXd::Map(values.data(), std::ssize(values));
-  return x.array() - x.mean();
-}
 
 }  // namespace
 
@@ -33,7 +27,7 @@ InnovationView::InnovationView(const InnovationSeries& series) : series_(&series
   }
   if (size() > 0) FindOutliers();
   for (const std::size_t i : tested_) {
-    if (!has_outliers_ || nis(i) <= outlier_nis_) core_.push_back(i);
+    if (!has_outliers_ || nis(i) <= outlier_nis_) inliers_.push_back(i);
   }
 }
 
@@ -81,24 +75,6 @@ double InnovationView::expected_nis() const {
   }
   const double cut = std::max(largest_accepted, smallest_rejected);
   return cut > 0.0 ? TruncatedMean(series_->dof, cut) : 1.0;
-}
-
-double Median(std::vector<double> values) {
-  std::ranges::sort(values);
-  return Quantile(values, 0.5);
-}
-
-double Mean(std::span<const double> values) {
-  return Eigen::VectorXd::Map(values.data(), std::ssize(values)).mean();
-}
-
-double SquaredDeviation(std::span<const double> values) { return Centred(values).squaredNorm(); }
-
-double LagOneCorrelation(std::span<const double> values) {
-  const Eigen::VectorXd x = Centred(values);
-  const Eigen::Index n = x.size();
-  const double square = x.squaredNorm();
-  return square > 0.0 ? x.head(n - 1).dot(x.tail(n - 1)) / square : 0.0;
 }
 
 }  // namespace alidade::internal

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "alidade/experiment/innovation_series.h"
+#include "alidade/model/geometry.h"
 
 /// Statistics that the rules of Diagnose share. The measurements of a frame, which have the same
 /// timestamp, depend on the same prediction. The statistics therefore count frames, not
@@ -48,7 +48,14 @@ class InnovationView {
   /// Return the elements of z and h that correspond to element k of r, and their unit.
   double z(std::size_t i, std::size_t k) const { return series_->z[i * ambient() + z_index(k)]; }
   double h(std::size_t i, std::size_t k) const { return series_->h[i * ambient() + z_index(k)]; }
+  /// Returns a - b for two values of element k of z or h, as an angle in (-pi, pi] for an angle.
+  double Difference(double a, double b, std::size_t k) const {
+    return is_angle(k) ? Angle::Wrap(a - b) : a - b;
+  }
+  bool is_angle(std::size_t k) const { return series_->is_angle[k] != 0; }
   const std::string& unit(std::size_t k) const { return series_->units[z_index(k)]; }
+  /// Returns the unit of element k of r. Elements without an element of z are angles.
+  std::string innovation_unit(std::size_t k) const { return has_z(k) ? unit(k) : "rad"; }
 
   /// Returns the index of the frame of measurement i. frame_count() is the number of frames.
   std::size_t frame(std::size_t i) const { return frames_[i]; }
@@ -61,7 +68,7 @@ class InnovationView {
   /// rejected, rejections are not due to chance; the tests then use the rejected measurements too.
   const Rows& tested() const { return tested_; }
   /// Tested measurements without outliers.
-  const Rows& core() const { return core_; }
+  const Rows& inliers() const { return inliers_; }
 
   /// Returns the median of NIS, divided by that of a consistent filter.
   double median_ratio() const { return median_ratio_; }
@@ -83,7 +90,7 @@ class InnovationView {
 
   const InnovationSeries* series_;
   std::vector<std::size_t> frames_;
-  Rows rejected_, tested_, core_;
+  Rows rejected_, tested_, inliers_;
   double median_ratio_ = 1.0, outlier_nis_ = 0.0, outlier_share_ = 0.0;
   bool has_outliers_ = false;
 };
@@ -112,13 +119,5 @@ std::vector<double> FrameMeans(const InnovationView& view, const Rows& rows, con
   for (const FrameSum& frame : SumFrames(view, rows, value)) means.push_back(frame.mean());
   return means;
 }
-
-/// Returns the median. `values` must not be empty.
-double Median(std::vector<double> values);
-double Mean(std::span<const double> values);
-/// Returns the sum of squared deviations from the mean.
-double SquaredDeviation(std::span<const double> values);
-/// Returns the autocorrelation at a delay of one value.
-double LagOneCorrelation(std::span<const double> values);
 
 }  // namespace alidade::internal

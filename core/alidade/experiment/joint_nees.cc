@@ -8,8 +8,6 @@
 namespace alidade::internal {
 namespace {
 
-constexpr double kSmallestSigma = 1e-9;  ///< relative to the largest prior sigma
-
 /// Computes the NEES in the directions whose sigma is large enough. C is in units of the prior
 /// sigmas.
 Nees NeesOfUncertainDirections(const Eigen::MatrixXd& c, const Eigen::VectorXd& error) {

@@ -17,6 +17,10 @@ struct BlockError {
   double prior_sigma = 0.0;  ///< result of LargestPriorSigma
 };
 
+/// Smallest sigma of an estimated direction, relative to the largest prior sigma of its block.
+/// Rounding errors exceed smaller sigmas.
+inline constexpr double kSmallestSigma = 1e-9;
+
 /// NEES e' C^-1 e with its degrees of freedom.
 struct Nees {
   double value = 0.0;  ///< NaN if C is singular or not finite
@@ -28,8 +32,8 @@ struct Nees {
 double LargestPriorSigma(const Problem& problem, BlockId id);
 
 /// Computes the joint NEES of the estimated blocks among `errors`. Metrics defines C = P + T. A
-/// direction whose sigma is below 1e-9 of the largest prior sigma of its block counts neither in
-/// the NEES nor in its degrees of freedom, because rounding errors exceed such a sigma.
+/// direction whose sigma is below kSmallestSigma counts neither in the NEES nor in its degrees of
+/// freedom.
 Nees JointNees(const State& state, std::span<const BlockError> errors);
 
 }  // namespace alidade::internal

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numbers>
 #include <optional>
 
 #include "alidade/base/number_text.h"
@@ -30,18 +29,6 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLostSigmas = 10.0;
 constexpr int kLostTimestamps = 20;
-constexpr double kFarSigmas = 100.0;
-constexpr double kFarAngleSigmas = 5.0;
-
-/// Returns true if the innovation of an angle indicates that the measurement has another unit. The
-/// innovation of an angle never exceeds pi. Another unit is likely if the innovation is far beyond
-/// its sigma, and if the innovation exceeds pi / 4 or the measurement exceeds a full turn.
-bool IsFarAngle(const MeasurementReport& measurement) {
-  if (!(measurement.nis > kFarAngleSigmas * kFarAngleSigmas)) return false;
-  if (measurement.innovation.empty() || measurement.z.empty()) return false;
-  return std::abs(measurement.innovation[0]) > 0.25 * std::numbers::pi ||
-         std::abs(measurement.z[0]) > 2.0 * std::numbers::pi;
-}
 
 }  // namespace
 
@@ -198,23 +185,7 @@ struct Metrics::Impl {
   std::vector<std::string> sensors, motions;   ///< names of sensors and motion models
   std::map<int, ImpliedBlock> implied_blocks;  ///< key: index of the sensor
   bool has_landmarks = false, has_ransac = false;
-  /// Number of accepted and gated measurements of a sensor, and the number of those that are far
-  /// off.
-  struct FarOffCounts {
-    std::int64_t total = 0, far_off = 0;
-  };
-  std::vector<FarOffCounts> far_off_counts;   ///< one element per sensor
-  std::vector<bool> measures_angle;           ///< one element per sensor
-  std::vector<NisSamples> nis_samples;        ///< one element per sensor
-  std::vector<SensorUse> uses;                ///< one element per sensor
-  std::vector<InnovationSeries> innovations;  ///< one element per sensor
-  /// Times of the frames with a used measurement, and the longest time between two of them.
-  struct {
-    std::int64_t frames = 0;
-    Timestamp first = kNoTimestamp, last = kNoTimestamp;
-    Timestamp last_frame = kNoTimestamp;  ///< last frame, with or without a used measurement
-    Gap longest = {};
-  } used;
+  std::vector<NisSamples> nis_samples;  ///< one element per sensor
   std::int64_t report_count = 0;
   std::map<int, std::vector<double>> reprojection;  ///< rms of each frame, by sensor
   std::vector<PeriodSums> periods;  ///< element 0 is the whole run; the segments follow
@@ -238,11 +209,8 @@ struct Metrics::Impl {
   void CheckElement(Timestamp timestamp, TrackedBlock& block, int element, double sigma);
   void AddNees(Owner& owner, std::size_t index, const std::vector<PeriodSums*>& destinations,
                const State& state);
-  void AddReport(Timestamp timestamp, const std::vector<PeriodSums*>& destinations,
-                 const UpdateReport& report);
+  void AddReport(const std::vector<PeriodSums*>& destinations, const UpdateReport& report);
   void AddInnovation(std::size_t sensor, const MeasurementReport& measurement);
-  void AddTimes(Timestamp timestamp, const UpdateReport& report);
-  void AddUse(std::size_t sensor, Timestamp timestamp, const MeasurementReport& measurement);
   /// Returns the accumulators of the whole run, and of each segment that contains the frame.
   std::vector<PeriodSums*> PeriodsOf(const std::vector<bool>& in_segment);
   const std::string& SubjectOf(const MetricInfo& metric, std::size_t index) const;
@@ -357,8 +325,9 @@ void Metrics::Impl::CheckElement(Timestamp timestamp, TrackedBlock& block, int e
   int& outside_count = block.outside_counts[element];
   if (outside_count < 0) return;
   const double error = std::abs(block.error[element]);
-  // If sigma is zero, the filter assumes that the value is known.
-  const bool is_inside = sigma == 0.0 || error <= kLostSigmas * sigma;
+  // If sigma is zero but for rounding errors, the filter assumes that the value is known.
+  const bool is_known = !(sigma > internal::kSmallestSigma * block.prior_sigma);
+  const bool is_inside = is_known || error <= kLostSigmas * sigma;
   outside_count = is_inside ? 0 : outside_count + 1;
   if (outside_count < kLostTimestamps) return;
   outside_count = -1;
@@ -416,9 +385,6 @@ void Metrics::Impl::AddNees(Owner& owner, std::size_t index,
 }
 
 void Metrics::Impl::AddInnovation(std::size_t sensor, const MeasurementReport& measurement) {
-  ++far_off_counts[sensor].total;
-  far_off_counts[sensor].far_off += measurement.nis > kFarSigmas * kFarSigmas * measurement.dof ||
-                                    (measures_angle[sensor] && IsFarAngle(measurement));
   NisSamples& samples = nis_samples[sensor];
   samples.dof = measurement.dof;
   if (measurement.outcome == Outcome::kGated) {
@@ -431,40 +397,7 @@ void Metrics::Impl::AddInnovation(std::size_t sensor, const MeasurementReport& m
   }
 }
 
-/// Counts whether the measurement was used, and records its innovation.
-void Metrics::Impl::AddUse(std::size_t sensor, Timestamp timestamp,
-                           const MeasurementReport& measurement) {
-  SensorUse& use = uses[sensor];
-  const Outcome outcome = measurement.outcome;
-  if (outcome == Outcome::kAccepted || outcome == Outcome::kInitialised) {
-    ++use.used;
-    use.rejected_in_a_row = 0;
-  } else if (InfoOf(outcome).is_rejection) {
-    ++use.rejected;
-    const bool is_single = measurement.landmark < 0;  // landmarks are rejected individually
-    if (is_single && use.rejected_in_a_row++ == 0) use.rejected_since = timestamp;
-  }
-  innovations[sensor].Add(timestamp, measurement);
-}
-
-/// Updates the longest time without a used measurement.
-void Metrics::Impl::AddTimes(Timestamp timestamp, const UpdateReport& report) {
-  if (report.stale) return;
-  used.last_frame = timestamp;
-  const auto is_used = [](const MeasurementReport& measurement) {
-    return measurement.outcome == Outcome::kAccepted ||
-           measurement.outcome == Outcome::kInitialised;
-  };
-  if (std::ranges::none_of(report.measurements(), is_used)) return;
-  if (used.frames++ == 0) {
-    used.first = timestamp;
-  } else if (timestamp - used.last > used.longest.end - used.longest.start) {
-    used.longest = {used.last, timestamp};
-  }
-  used.last = timestamp;
-}
-
-void Metrics::Impl::AddReport(Timestamp timestamp, const std::vector<PeriodSums*>& destinations,
+void Metrics::Impl::AddReport(const std::vector<PeriodSums*>& destinations,
                               const UpdateReport& report) {
   ++report_count;
   if (has_landmarks) {
@@ -484,7 +417,6 @@ void Metrics::Impl::AddReport(Timestamp timestamp, const std::vector<PeriodSums*
     if (count == nullptr)
       count = &counts[MetricKey{ToString(measurement.outcome), sensors[sensor], ""}.text()];
     ++*count;
-    AddUse(sensor, timestamp, measurement);
     const bool is_accepted = measurement.outcome == Outcome::kAccepted;
     if ((!is_accepted && measurement.outcome != Outcome::kGated) || measurement.dof <= 0) continue;
     AddInnovation(sensor, measurement);
@@ -495,7 +427,6 @@ void Metrics::Impl::AddReport(Timestamp timestamp, const std::vector<PeriodSums*
                               {measurement.nis, measurement.dof, log_det_s, is_accepted});
     }
   }
-  AddTimes(timestamp, report);
   for (auto& [sensor, frames] : reprojection) {
     const double rms = internal::FrameInnovationOf(report, sensor).rms;
     if (std::isfinite(rms)) frames.push_back(rms);
@@ -579,15 +510,8 @@ Metrics::Metrics(const EstimatorSpec& spec, const std::vector<StreamInfo>& truth
     impl_->reprojection[static_cast<int>(s)] = {};
   }
   impl_->outcome_counts.resize(impl_->sensors.size());
-  for (const SensorBinding& sensor : spec.problem.sensors) {
-    impl_->uses.push_back({.sensor = sensor.name});
-    impl_->innovations.push_back(InnovationSeries(sensor));
-  }
-  impl_->far_off_counts.resize(impl_->sensors.size());
   const bool is_filter = spec.estimator == nullptr || !spec.estimator->offline();
   for (const SensorBinding& sensor : spec.problem.sensors) {
-    const Geometry& geometry = sensor.model->measurement().geometry;
-    impl_->measures_angle.push_back(geometry.is_angle());
     impl_->nis_samples.emplace_back().has_bounds = is_filter && sensor.loss.kind == LossKind::kNone;
   }
   impl_->periods.resize(1 + segments.size());
@@ -608,12 +532,11 @@ void Metrics::Add(const SourceFrame& frame, const std::vector<bool>& in_segment,
     impl_->AddErrors(frame.timestamp, destinations, &state);
     impl_->AddImplied(frame.truth, destinations, report);
   }
-  impl_->AddReport(frame.timestamp, destinations, report);
+  impl_->AddReport(destinations, report);
 }
 
-void Metrics::AddReport(Timestamp timestamp, const std::vector<bool>& in_segment,
-                        const UpdateReport& report) {
-  impl_->AddReport(timestamp, impl_->PeriodsOf(in_segment), report);
+void Metrics::AddReport(const std::vector<bool>& in_segment, const UpdateReport& report) {
+  impl_->AddReport(impl_->PeriodsOf(in_segment), report);
 }
 
 void Metrics::AddDifference(Timestamp timestamp, const std::vector<std::vector<double>>& reference,
@@ -635,33 +558,7 @@ std::vector<std::string> Metrics::blocks_without_truth() const {
   return names;
 }
 
-std::vector<int> Metrics::far_off_sensors() const {
-  std::vector<int> sensors;
-  for (std::size_t i = 0; i < impl_->far_off_counts.size(); ++i) {
-    const Impl::FarOffCounts& counts = impl_->far_off_counts[i];
-    if (2 * counts.far_off > counts.total) sensors.push_back(static_cast<int>(i));
-  }
-  return sensors;
-}
-
 const std::vector<Event>& Metrics::events() const { return impl_->events; }
-
-std::optional<Metrics::Gap> Metrics::longest_gap() const {
-  constexpr std::int64_t kMinFrames = 20;
-  const auto& used = impl_->used;
-  if (used.frames < kMinFrames) return std::nullopt;
-  Gap gap = used.longest;
-  if (used.last_frame - used.last > gap.end - gap.start) gap = {used.last, used.last_frame};
-  const double remaining_time = static_cast<double>(
-      (used.last - used.first) - (gap.start < used.last ? gap.end - gap.start : 0));
-  const double mean = remaining_time / static_cast<double>(used.frames - 1);
-  if (static_cast<double>(gap.end - gap.start) < kLongGap * mean) return std::nullopt;
-  return gap;
-}
-
-const std::vector<SensorUse>& Metrics::uses() const { return impl_->uses; }
-
-const std::vector<InnovationSeries>& Metrics::innovations() const { return impl_->innovations; }
 
 std::vector<NeesSeries> Metrics::nees() const {
   std::vector<NeesSeries> series;

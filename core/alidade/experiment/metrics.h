@@ -4,11 +4,9 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "alidade/experiment/innovation_series.h"
 #include "alidade/experiment/run.h"
 #include "alidade/experiment/verdict.h"
 
@@ -47,8 +45,7 @@ class Metrics {
   void Add(const SourceFrame& frame, const std::vector<bool>& in_segment, const State& state,
            const UpdateReport& report);
   /// Adds the part of a frame that needs no truth: counts and NIS.
-  void AddReport(Timestamp timestamp, const std::vector<bool>& in_segment,
-                 const UpdateReport& report);
+  void AddReport(const std::vector<bool>& in_segment, const UpdateReport& report);
   /// Adds the errors of an estimate relative to the reference estimator, which replaces the truth:
   /// rmse, lag_ms and final_error only. P does not bound these differences, because both estimators
   /// use the same data. `reference` and `estimate` contain one value for each block of the
@@ -60,25 +57,8 @@ class Metrics {
   /// that the truth of the block is known, and the error of the element exceeded 10 sigma for 20
   /// timestamps in a row.
   const std::vector<Event>& events() const;
-  /// Returns the indices of the sensors whose measurements may have the wrong unit: more than half
-  /// of the accepted and gated measurements are far from their prediction. A measurement is far
-  /// from its prediction if sqrt(r' S^-1 r / dof) > 100. For an angle, r never exceeds pi. An angle
-  /// is far if |r| > 5 sqrt(S), and also |r| > pi / 4 or |z| > 2 pi.
-  std::vector<int> far_off_sensors() const;
   /// Returns the names of the blocks whose truth the source declares, but which no frame contained.
   std::vector<std::string> blocks_without_truth() const;
-  /// Returns the longest time without a used measurement, between used measurements and up to the
-  /// last frame; nullopt unless it is at least kLongGap times the mean interval between frames with
-  /// a used measurement.
-  struct Gap {
-    Timestamp start, end;
-  };
-  static constexpr double kLongGap = 30.0;
-  std::optional<Gap> longest_gap() const;
-  /// Returns the use of the measurements of each sensor.
-  const std::vector<SensorUse>& uses() const;
-  /// Returns the innovations of each sensor.
-  const std::vector<InnovationSeries>& innovations() const;
   /// Returns the NEES of each owner of blocks with truth.
   std::vector<NeesSeries> nees() const;
   /// Returns all metrics by key.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 #include <vector>
@@ -133,7 +134,8 @@ RateSamples RatesOf(const InnovationView& view, std::size_t k) {
     if (!is_first && step_s == 0.0) return {};
     if (is_first || !(step_s > 0.0)) continue;
     samples.rows.push_back(i);
-    samples.rate.push_back((view.h(i, k) - view.h(before, k)) / step_s / view.s(i, k));
+    samples.rate.push_back(view.Difference(view.h(i, k), view.h(before, k), k) / step_s /
+                           view.s(i, k));
     samples.u.push_back(view.u(i, k));
     samples.step_s.push_back(step_s);
   }
@@ -177,12 +179,11 @@ Scale ScaleOf(const InnovationView& view, const Rows& rows, const Value& value) 
           static_cast<double>(means.size()) / std::min(CorrelationTime(means), kMaxTime)};
 }
 
-/// Returns the mean NIS of a quarter of the core, from the measurement `begin`. `order` sorts the
-/// core.
-double QuarterMean(const InnovationView& view, const Rows& order, std::size_t begin) {
+/// Returns the mean NIS of a quarter of the rows, from index `begin`.
+double QuarterMean(const InnovationView& view, const Rows& rows, std::size_t begin) {
   double sum = 0.0;
-  const std::size_t count = order.size() / 4;
-  for (std::size_t j = 0; j < count; ++j) sum += view.nis(order[begin + j]);
+  const std::size_t count = rows.size() / 4;
+  for (std::size_t j = 0; j < count; ++j) sum += view.nis(rows[begin + j]);
   return sum / static_cast<double>(count);
 }
 
@@ -197,13 +198,13 @@ Rows AcceptedRows(const InnovationView& view) {
 
 }  // namespace
 
-MaybeFinding TestNoiseModel(const InnovationView& view) {
+std::optional<Finding> TestNoiseModel(const InnovationView& view) {
   constexpr double kMaxNis = 16.0, kMinNis = 1e-12, kMinSpread = 0.05;
   constexpr std::size_t kMinFrames = 60;
   if (view.dof() != 1 || !view.has_z(0)) return {};
   Rows rows;
   std::vector<double> size, nis;  // log |h|, and the NIS up to kMaxNis
-  for (const std::size_t i : view.core()) {
+  for (const std::size_t i : view.inliers()) {
     if (view.h(i, 0) == 0.0 || view.nis(i) <= kMinNis) continue;
     rows.push_back(i);
     size.push_back(std::log(std::abs(view.h(i, 0))));
@@ -222,7 +223,7 @@ MaybeFinding TestNoiseModel(const InnovationView& view) {
           "model; choose another noise model");
 }
 
-MaybeFinding TestTails(const InnovationView& view) {
+std::optional<Finding> TestTails(const InnovationView& view) {
   if (!view.has_outliers() || view.series().has_robust_loss) return {};
   return MakeFinding(
       FindingKind::kHeavyTails, view, view.outlier_share(),
@@ -233,21 +234,21 @@ MaybeFinding TestTails(const InnovationView& view) {
                : "the gate rejects some of them; find their cause, or use `loss: {huber: 1.345}`"));
 }
 
-MaybeFinding TestElements(const InnovationView& view) {
+std::optional<Finding> TestElements(const InnovationView& view) {
   constexpr double kMinContrast = 1.6, kMinFactor = 1.3;
   if (view.dof() < 2) return {};
-  double smallest = 1e300, largest = 0.0, worst = 1.0;
+  double smallest = std::numeric_limits<double>::infinity(), largest = 0.0, worst = 1.0;
   std::string list;
   for (std::size_t k = 0; k < view.dof(); ++k) {
     const Scale scale =
-        ScaleOf(view, view.core(), [&](std::size_t i) { return view.u(i, k) * view.u(i, k); });
+        ScaleOf(view, view.inliers(), [&](std::size_t i) { return view.u(i, k) * view.u(i, k); });
     const double factor = scale.factor();
     smallest = std::min(smallest, factor);
     largest = std::max(largest, factor);
     const bool is_wrong = std::abs(std::log(factor)) > std::log(kMinFactor);
     if (!is_wrong || scale.Test(1.0) == ScaleTest::kPassed) continue;
     list += (list.empty() ? "" : ", ") + RoundedText(factor, 3) + " for element " +
-            std::to_string(k) + UnitHint(factor);
+            std::to_string(k) + UnitHint(factor, view.innovation_unit(k));
     if (std::abs(std::log(factor)) > std::abs(std::log(worst))) worst = factor;
   }
   if (list.empty() || !(largest > kMinContrast * smallest)) return {};
@@ -255,11 +256,11 @@ MaybeFinding TestElements(const InnovationView& view) {
                      "the ratio of the innovations to their predicted size depends on the element: "
                      "it is " +
                          list +
-                         "; multiply the sigma of each of these elements by its ratio, and check "
-                         "its unit");
+                         "; multiply the sigma of each of these elements by its ratio and check "
+                         "its unit, or change the process noise");
 }
 
-MaybeFinding TestTimeOffset(const InnovationView& view) {
+std::optional<Finding> TestTimeOffset(const InnovationView& view) {
   constexpr double kMinNormal = 6.0, kMinCorrelation = -0.1;
   const ElementStatistic offset = Largest(view, OffsetOf);
   if (!(std::abs(offset.normal) > kMinNormal)) return {};
@@ -276,7 +277,7 @@ MaybeFinding TestTimeOffset(const InnovationView& view) {
                          "one, or estimate it, because the true value may be larger");
 }
 
-MaybeFinding TestBias(const InnovationView& view) {
+std::optional<Finding> TestBias(const InnovationView& view) {
   constexpr double kMinSigmas = 0.1;
   const ElementStatistic bias = Largest(view, BiasOf);
   if (!(std::abs(bias.normal) > kMaxNormal && std::abs(bias.value) > kMinSigmas)) return {};
@@ -290,7 +291,7 @@ MaybeFinding TestBias(const InnovationView& view) {
                          "calibration is wrong; correct it or estimate it");
 }
 
-MaybeFinding TestCorrelation(const InnovationView& view) {
+std::optional<Finding> TestCorrelation(const InnovationView& view) {
   constexpr double kMinCorrelation = 0.15;
   const ElementStatistic rho = Largest(view, CorrelationOf);
   if (!(std::abs(rho.normal) > kMaxNormal && std::abs(rho.value) > kMinCorrelation)) return {};
@@ -306,12 +307,12 @@ MaybeFinding TestCorrelation(const InnovationView& view) {
                          "is too small; decrease the process noise or increase sigma"));
 }
 
-MaybeFinding TestScaleOfNis(const InnovationView& view) {
+std::optional<Finding> TestScaleOfNis(const InnovationView& view) {
   if (view.series().has_robust_loss) return {};
   const int dof = view.series().dof;
   const double expected = dof * view.expected_nis();
   const auto relative_nis = [&](std::size_t i) { return view.nis(i) / expected; };
-  const Scale scale = ScaleOf(view, view.core(), relative_nis);
+  const Scale scale = ScaleOf(view, view.inliers(), relative_nis);
   const ScaleTest test = scale.Test(dof);
   if (test != ScaleTest::kTooLarge) {
     const Scale all = ScaleOf(view, AcceptedRows(view), relative_nis);
@@ -327,7 +328,8 @@ MaybeFinding TestScaleOfNis(const InnovationView& view) {
   const bool is_large = test == ScaleTest::kTooLarge;
   const FindingKind kind = is_large ? FindingKind::kOverconfident : FindingKind::kUnderconfident;
   const std::string size = "innovations are " + RoundedText(factor, 3) +
-                           " times as large as predicted" + UnitHint(factor);
+                           " times as large as predicted" +
+                           (view.dof() == 1 ? UnitHint(factor, view.innovation_unit(0)) : "");
   if (TestElements(view)) {
     return MakeFinding(kind, view, factor, size + "; this ratio depends on the element");
   }

@@ -2,10 +2,12 @@
 #include "alidade/experiment/parameter_tests.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <utility>
 
 #include "alidade/base/number_text.h"
+#include "alidade/base/text.h"
 #include "alidade/experiment/accepted_data.h"
 #include "alidade/experiment/build_estimator.h"
 #include "alidade/experiment/calibration.h"
@@ -33,7 +35,9 @@ class AcceptedFrames : public RunObserver {
     if (spec.name != estimator_) return;
     frames_.push_back(internal::AcceptedMeasurements(frame, experiment_->source->streams(),
                                                      spec.problem, report));
-    measurements_ += std::ssize(frames_.back().measurements);
+    measurements_ += std::ranges::count_if(report.measurements(), [](const MeasurementReport& m) {
+      return InfoOf(m.outcome).is_used;
+    });
   }
   bool is_full() const { return measurements_ >= kMaxTestedMeasurements; }
   const std::vector<Frame>& frames() const { return frames_; }
@@ -51,6 +55,9 @@ std::string WhyNotTested(const EstimatorSpec& spec) {
     return "an estimator of type '" + spec.type +
            "' has no innovations of predictions; only recursive filters are tested";
   }
+  if (spec.accepted_by >= 0) {
+    return "it uses only measurements that another estimator accepted; test that estimator";
+  }
   for (const SensorBinding& sensor : spec.problem.sensors) {
     if (!sensor.outlier_rejection) continue;
     return "sensor '" + sensor.name +
@@ -65,13 +72,20 @@ std::string WhyNotTested(const EstimatorSpec& spec) {
 /// Runs of one filter with the same data and different parameters.
 class FilterRuns {
  public:
-  /// Builds the experiment of the config. `name` is an estimator of the config.
+  /// Builds the experiment of the config. Error: kBadConfig if it has no estimator `name`.
   FilterRuns(const Config& config, const PluginHost& host, const std::string& name)
       : config_(config.Copy()),
         host_(host),
         name_(name),
         experiment_(BuildExperiment(config_, host)),
-        data_(name) {}
+        data_(name) {
+    const auto& estimators = experiment_.estimators;
+    if (std::ranges::find(estimators, name, &EstimatorSpec::name) != estimators.end()) return;
+    config_.root()
+        .At("estimators")
+        .Fail("estimator '" + name + "' does not exist",
+              internal::Join(internal::NamesOf(estimators)));
+  }
 
   const EstimatorSpec& spec() const {
     return *std::ranges::find(experiment_.estimators, name_, &EstimatorSpec::name);
@@ -92,8 +106,7 @@ class FilterRuns {
   /// Runs the filter as configured, and stores the measurements that it accepts. Errors: the error
   /// that ended the run.
   void ReadData(const std::function<bool()>& stop) {
-    // Another filter may guide the source, or select the measurements.
-    if (experiment_.guide == nullptr && spec().accepted_by < 0) {
+    if (experiment_.guide == nullptr) {  // another filter may guide the source
       std::erase_if(experiment_.estimators,
                     [&](const EstimatorSpec& spec) { return spec.name != name_; });
       experiment_.reference = -1;
@@ -107,20 +120,26 @@ class FilterRuns {
     }
   }
 
+  /// Returns the runs of the same filter with the number of a parameter, without data.
+  FilterRuns With(const FilterParameter& parameter) const {
+    return {ConfigWith(parameter, parameter.value()), host_, name_};
+  }
   /// Returns the setting that changes a parameter for this filter only.
   std::string SettingOf(const FilterParameter& parameter, double value) const {
     return KeyOf(parameter) + '=' + parameter.YamlOf(value);
   }
 
   /// Returns the innovations of the filter with `value` for the parameter, or with the numbers of
-  /// the config if `parameter` is null. Errors: kBadConfig if the filter does not support the value.
+  /// the config if `parameter` is null. Errors: kBadConfig if the filter does not support the
+  /// value.
   InnovationRows Run(const FilterParameter* parameter, double value) const {
-    Config config = config_.Copy();
+    Config config = parameter == nullptr ? config_.Copy() : ConfigWith(*parameter, value);
     const std::string entry = "estimators." + name_;
     config.Set(entry + ".fuse", "per_measurement", kOrigin);
     config.Set(entry + ".gate", "none", kOrigin);
+    // `use` rejects a filter that reads a stream by two sensors: AcceptedMeasurements cannot
+    // distinguish their measurements.
     config.Set(entry + ".use", "{accepted_by: " + name_ + '}', kOrigin);
-    if (parameter != nullptr) config.Set(KeyOf(*parameter), parameter->YamlOf(value), kOrigin);
     const Config calibrated = internal::WithCalibration(config, *experiment_.source);
     const EstimatorSpec filter = internal::BuildEstimator(
         name_ + "-varied", calibrated.root().At("estimators").At(name_), calibrated, host_,
@@ -139,6 +158,13 @@ class FilterRuns {
  private:
   std::string KeyOf(const FilterParameter& parameter) const {
     return "estimators." + name_ + ".overrides." + parameter.key;
+  }
+
+  /// Returns the config, changed by the setting of a parameter.
+  Config ConfigWith(const FilterParameter& parameter, double value) const {
+    Config config = config_.Copy();
+    config.Set(KeyOf(parameter), parameter.YamlOf(value), kOrigin);
+    return config;
   }
 
   Config config_;
@@ -178,7 +204,10 @@ double RoundedEstimate(const ParameterTest& test) {
   constexpr int kMinDigits = 3, kMaxDigits = 15;
   const double digits = 1.0 + std::ceil(std::log10(std::abs(test.better) / test.sigma));
   const int count = static_cast<int>(std::clamp<double>(digits, kMinDigits, kMaxDigits));
-  return std::stod(internal::RoundedText(test.better, count));
+  const std::string text = internal::RoundedText(test.better, count);
+  double rounded = test.better;
+  std::from_chars(text.data(), text.data() + text.size(), rounded);
+  return rounded;
 }
 
 /// Test of a parameter, with its score.
@@ -234,6 +263,62 @@ std::vector<ParameterTest> Ordered(std::vector<ScoredTest> results) {
   return tests;
 }
 
+/// Number of runs of the filter, for the progress.
+class RunCounter {
+ public:
+  RunCounter(const ParameterTestOptions& options, std::int64_t total)
+      : options_(options), total_(total) {}
+
+  const std::function<bool()>& stop() const { return options_.stop; }
+  void Expect(std::int64_t runs) { total_ += runs; }
+  /// Adds finished runs. Error: kStopped.
+  void Add(std::int64_t runs) {
+    done_ += runs;
+    if (options_.progress) options_.progress(done_, total_);
+    if (options_.stop && options_.stop()) throw Error(ExitCode::kStopped, "the tests were stopped");
+  }
+
+ private:
+  const ParameterTestOptions& options_;
+  std::int64_t done_ = 0, total_;
+};
+
+/// Tests a parameter whose number is the estimate of `test`. The filter reads the data again,
+/// because its gate then accepts other measurements.
+ParameterTest TestEstimate(const ParameterTest& test, FilterParameter parameter,
+                           const FilterRuns& runs, const std::function<bool()>& stop) {
+  parameter.values[parameter.element] = test.better;
+  FilterRuns changed = runs.With(parameter);
+  changed.ReadData(stop);
+  return TestParameter(changed, parameter, changed.Run(nullptr, 0.0)).test;
+}
+
+/// Replaces the estimate of a test by that of further scoring steps, each from the last estimate.
+/// Ends if a step is shorter than 5 % of the estimate or than its standard deviation, if it cannot
+/// be computed, or after kMaxSteps.
+void Refine(const FilterParameter& parameter, const FilterRuns& runs, RunCounter& counter,
+            ParameterTest& test) {
+  constexpr int kMaxSteps = 3;
+  constexpr std::int64_t kRunsOfStep = 4;
+  constexpr double kMaxChange = 0.05;
+  for (int step = 0; step < kMaxSteps; ++step) {
+    counter.Expect(kRunsOfStep);
+    ParameterTest next;
+    try {
+      next = TestEstimate(test, parameter, runs, counter.stop());
+    } catch (const Error& e) {  // for example, a run that diverges with this number
+      next.not_tested = e.what();
+    }
+    counter.Add(kRunsOfStep);
+    if (!next.not_tested.empty()) return;
+    const double change = std::abs(next.better - test.better);
+    test.better = next.better;
+    test.sigma = next.sigma;
+    test.setting = next.setting;
+    if (change < std::max(test.sigma, kMaxChange * std::abs(test.better))) return;
+  }
+}
+
 }  // namespace
 
 bool ParameterTest::is_alarm() const { return std::abs(z) > kParameterAlarm; }
@@ -244,15 +329,9 @@ ParameterTests TestParameters(const Config& config, const PluginHost& host, cons
   ParameterTests tests{name, WhyNotTested(runs.spec())};
   if (!tests.not_tested.empty()) return tests;
   const std::vector<FilterParameter> parameters = runs.Parameters();
-  const auto total = 2 + 2 * std::ssize(parameters);
-  std::int64_t done = 0;
-  const auto add_done = [&](std::int64_t count) {
-    done += count;
-    if (options.progress) options.progress(done, total);
-    if (options.stop && options.stop()) throw Error(ExitCode::kStopped, "the tests were stopped");
-  };
+  RunCounter counter(options, 2 + 2 * std::ssize(parameters));
   runs.ReadData(options.stop);
-  add_done(1);
+  counter.Add(1);
   InnovationRows center;
   try {
     center = runs.Run(nullptr, 0.0);
@@ -260,13 +339,17 @@ ParameterTests TestParameters(const Config& config, const PluginHost& host, cons
     tests.not_tested = e.what();
     return tests;
   }
-  add_done(1);
+  counter.Add(1);
   std::vector<ScoredTest> results;
   for (const FilterParameter& parameter : parameters) {
     results.push_back(TestParameter(runs, parameter, center));
-    add_done(2);
+    counter.Add(2);
   }
   tests.parameters = Ordered(std::move(results));
+  if (!tests.parameters.empty() && tests.parameters.front().is_alarm()) {
+    ParameterTest& first = tests.parameters.front();
+    Refine(*std::ranges::find(parameters, first.key, &FilterParameter::name), runs, counter, first);
+  }
   return tests;
 }
 

@@ -23,9 +23,9 @@ struct ParameterTest {
   /// Setting of the config that changes the number for this filter only, as in
   /// `estimators.ekf.overrides.sensors.stereo.sigma_px=1.5`.
   std::string setting;
-  /// Parameter with a larger |z| that has almost the same or the opposite effect on the innovations,
-  /// or "". The data do not show which of the two is wrong. An example is the clock offset of one of
-  /// two sensors.
+  /// Parameter with a larger |z| that has almost the same or the opposite effect on the
+  /// innovations, or "". The data do not show which of the two is wrong. An example is the clock
+  /// offset of one of two sensors.
   std::string alternative_to;
   std::string not_tested;  ///< reason why there is no result, or ""
 
@@ -52,15 +52,18 @@ struct ParameterTestOptions {
 /// processes the data of the config. Then it processes the measurements that it accepted, once
 /// with the numbers of the config, and twice for each parameter: with a slightly smaller and a
 /// slightly larger number. In these runs, each measurement is an update of its own, so that the
-/// innovations are independent, and there is no gate. The innovations of a sensor with a robust loss
-/// are not used. Only the first kMaxTestedMeasurements measurements are used.
+/// innovations are independent, and there is no gate. The innovations of a sensor with a robust
+/// loss are not used. Only the first kMaxTestedMeasurements measurements are used.
 ///
 /// The tested quantity of a standard deviation is log sigma. `better` is sqrt(1 + 2 d) sigma, with
 /// d = Score::step(); this is the scoring step of sigma^2, which is exact if S is proportional to
-/// sigma^2.
+/// sigma^2. If the first test is an alarm, up to three further steps, each from the last estimate,
+/// improve `better` and `sigma` of this test. A step is too short if the number is wrong by a large
+/// factor, or if the gate rejected the largest innovations.
 ///
 /// Smoothers, batches and estimators of plugins are not tested, because they have no innovations.
-/// Errors: those of BuildExperiment; the error that ended the run that reads the data; kStopped.
+/// Errors: kBadConfig if the config has no estimator `name`; those of BuildExperiment; the error
+/// that ended the run that reads the data; kStopped.
 ParameterTests TestParameters(const Config& config, const PluginHost& host, const std::string& name,
                               const ParameterTestOptions& options);
 inline constexpr std::int64_t kMaxTestedMeasurements = 100'000;

@@ -62,9 +62,9 @@ double Correlation(const Score& a, const Score& b);
 ///   F      = sum 1/2 tr(S^-1 dS S^-1 dS) + dr' S^-1 dr
 ///
 /// The sums contain the measurements that all three runs accepted. dr and dS are central
-/// differences. w = m / E[r' S^-1 r] corrects for data from which a gate with the probability `gate`
-/// removed the largest innovations. Returns nullopt if more than 2 % of the measurements were not accepted
-/// in all runs, or if the innovations do not depend on theta.
+/// differences. w = m / E[r' S^-1 r] corrects for data from which a gate with the probability
+/// `gate` removed the largest innovations. Returns nullopt if more than 2 % of the measurements
+/// were not accepted in all runs, or if the innovations do not depend on theta.
 ///
 /// Source       [Harvey1989] sec. 3.4, [Rao1948].
 std::optional<Score> ComputeScore(const InnovationRows& center, const InnovationRows& minus,

@@ -27,6 +27,14 @@ double AutocorrelationTime(const std::vector<double>& series, double mean) {
   return std::clamp(tau, 1.0, static_cast<double>(n));
 }
 
+double LagOneCorrelation(const std::vector<double>& series) {
+  Eigen::VectorXd x = Eigen::VectorXd::Map(series.data(), std::ssize(series));
+  x.array() -= x.mean();
+  const Eigen::Index n = x.size();
+  const double square = x.squaredNorm();
+  return square > 0.0 ? x.head(n - 1).dot(x.tail(n - 1)) / square : 0.0;
+}
+
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();

@@ -12,6 +12,9 @@ namespace alidade {
 /// sum ends before the first pair with rho(k) + rho(k + 1) <= 0 [Geyer1992, sec. 3.3].
 double AutocorrelationTime(const std::vector<double>& series, double mean);
 
+/// Returns the autocorrelation about the mean at a delay of one value.
+double LagOneCorrelation(const std::vector<double>& series);
+
 /// Computes the delay of `signal` relative to `reference`. Both series have n samples at intervals
 /// of `step`, and the result has the unit of `step`. The delay is the shift k that maximises the
 /// correlation coefficient of the n - |k| overlapping samples, for |k| <= min(n/4, 2000). A

@@ -5,6 +5,7 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/statistics.h"
+#include "alidade/estimation/recovery.h"
 #include "alidade/experiment/time_series.h"
 
 namespace alidade {
@@ -13,7 +14,9 @@ namespace {
 using internal::RoundedText;
 
 constexpr std::int64_t kMinSamples = 20;
-constexpr std::int64_t kMaxRejectedInARow = 20;
+/// Probabilities p of TestScale for a mean NEES: without and with a finding about the innovations. A
+/// finding and a large NEES hardly ever occur together by chance.
+constexpr double kAlone = 8e-7, kBesideFinding = 5e-3;
 
 /// Returns the verdict `state` for the first event that satisfies `is_cause`.
 template <class Predicate>
@@ -26,35 +29,41 @@ Verdict FromEvent(VerdictState state, std::span<const Event> events, const Predi
 std::optional<Verdict> FromRejections(std::span<const SensorUse> sensors) {
   for (const SensorUse& use : sensors) {
     const std::int64_t total = use.used + use.rejected;
-    const bool at_end = use.rejected_in_a_row >= kMaxRejectedInARow;
+    const bool at_end = use.rejected_in_a_row >= internal::Recovery::kMostlyRejected;
     if (!at_end && (2 * use.rejected <= total || total < kMinSamples)) continue;
     return Verdict{
         .state = VerdictState::kMostlyRejected,
-        .because = "sensor '" + use.sensor + "': " + std::to_string(use.rejected) + " of " +
-                   std::to_string(total) + " measurements were rejected" +
+        .because = use.RejectionText() +
                    (at_end ? ", and all of the last " + std::to_string(use.rejected_in_a_row) : ""),
         .since = at_end ? use.rejected_since : kNoTimestamp};
   }
   return std::nullopt;
 }
 
-/// Returns the number of independent values whose mean is as certain as the mean of the series. The
-/// autocorrelation is about the mean of the series. A short series hides slow components, so its
-/// time is multiplied by kSafety. If the values vary much less than those of independent runs, as
-/// for a constant, the series counts as one value.
-double IndependentValues(const NeesSeries& series, double mean) {
+/// Number of independent values whose mean is as certain as the mean of a series.
+struct IndependentCount {
+  double count = 1.0;
+  const char* reason = "";  ///< reason why the series counts as one value, as a suffix
+};
+
+/// Counts the independent values of a series. The autocorrelation is about the mean of the series.
+/// A short series hides slow components, so its time is multiplied by kSafety. If the values vary
+/// much less than those of independent runs, as for a constant, the series counts as one value.
+IndependentCount IndependentValues(const NeesSeries& series, double mean) {
   constexpr double kSmallestVariance = 0.25;  // relative to that of chi2(dof) / dof
   constexpr double kSafety = 5.0;
-  double variance = 0.0;
-  for (const double value : series.values) variance += (value - mean) * (value - mean);
   const auto n = static_cast<double>(series.values.size());
-  variance /= n;
-  if (variance < kSmallestVariance * 2.0 / series.dof * mean * mean) return 1.0;
-  return std::max(1.0, n / (kSafety * AutocorrelationTime(series.values, mean)));
+  const double variance = SquaredDeviation(series.values) / n;
+  if (variance < kSmallestVariance * 2.0 / series.dof * mean * mean) {
+    return {.reason = " (nearly constant)"};
+  }
+  const double count = n / (kSafety * AutocorrelationTime(series.values, mean));
+  if (count <= 1.0) return {.reason = " (strongly correlated)"};
+  return {.count = count};
 }
 
-/// Returns the verdict of the NEES that is farthest from 1.
-Verdict FromNees(std::span<const NeesSeries> owners) {
+/// Returns the verdict of the NEES that is farthest from 1. TestScale has the probability p.
+Verdict FromNees(std::span<const NeesSeries> owners, double p) {
   Verdict verdict;
   verdict.state = VerdictState::kConsistent;
   verdict.basis = VerdictBasis::kNees;
@@ -62,13 +71,11 @@ Verdict FromNees(std::span<const NeesSeries> owners) {
   std::string means;
   for (const NeesSeries& owner : owners) {
     if (std::ssize(owner.values) < kMinSamples) continue;
-    double sum = 0.0;
-    for (const double value : owner.values) sum += value;
-    const double mean = sum / static_cast<double>(owner.values.size());
-    const double independent = IndependentValues(owner, mean);
-    const ScaleTest test = TestScale(mean, owner.dof, independent);
-    means += (means.empty() ? "" : ", ") + owner.owner + ' ' + RoundedText(mean, 3) +
-             (independent > 1.0 ? "" : " (nearly constant)");
+    const double mean = Mean(owner.values);
+    const IndependentCount independent = IndependentValues(owner, mean);
+    const ScaleTest test = TestScale(mean, owner.dof, independent.count, p);
+    means +=
+        (means.empty() ? "" : ", ") + owner.owner + ' ' + RoundedText(mean, 3) + independent.reason;
     if (test == ScaleTest::kPassed) continue;
     const double distance = std::max(mean, 1.0 / mean);
     if (!(distance > worst)) continue;
@@ -105,23 +112,29 @@ std::optional<Verdict> FromInnovationSizes(std::span<const Finding> findings) {
 /// Returns the verdict without truth of an estimator whose innovations have the expected size.
 Verdict WithoutTruth(const VerdictFacts& facts) {
   if (facts.tested_sensors == 0) {
-    return {.because =
-                "there is no truth, and no sensor without robust loss has accepted "
-                "measurements at " +
-                std::to_string(kMinDiagnosedFrames) + " timestamps"};
+    return {
+        .because =
+            "without truth, the test needs accepted measurements of a sensor without robust loss "
+            "at " +
+            std::to_string(kMinDiagnosedFrames) + " timestamps"};
   }
   return {.state = VerdictState::kConsistent,
-          .because = "the NIS is as expected; there is no truth to test the errors",
+          .because = "the NIS is as expected; without truth, the errors cannot be tested",
           .basis = VerdictBasis::kNis};
 }
 
 /// Returns the first verdict that applies.
 Verdict VerdictOf(const VerdictFacts& facts) {
-  const auto is_divergence = [](const Event& event) {
-    return event.divergence || InfoOf(event.kind).severity == EventSeverity::kError;
+  const auto is_divergence = [](const Event& event) { return event.divergence; };
+  const auto is_error = [](const Event& event) {
+    return InfoOf(event.kind).severity == EventSeverity::kError;
   };
-  if (facts.failed) return FromEvent(VerdictState::kFailed, facts.events, is_divergence);
-  if (facts.diverged) return FromEvent(VerdictState::kDiverged, facts.events, is_divergence);
+  if (facts.failed || facts.diverged) {
+    const VerdictState state = facts.failed ? VerdictState::kFailed : VerdictState::kDiverged;
+    return std::ranges::any_of(facts.events, is_divergence)
+               ? FromEvent(state, facts.events, is_divergence)
+               : FromEvent(state, facts.events, is_error);
+  }
   if (!facts.run_failure.empty()) {
     return {.state = VerdictState::kFailed,
             .because = "the run ended early: " + std::string(facts.run_failure)};
@@ -133,7 +146,12 @@ Verdict VerdictOf(const VerdictFacts& facts) {
     return verdict;
   }
   if (const auto rejected = FromRejections(facts.sensors)) return *rejected;
-  Verdict verdict = facts.nees.empty() ? WithoutTruth(facts) : FromNees(facts.nees);
+  const auto is_used = [](const SensorUse& use) { return use.used > 0; };
+  if (!facts.sensors.empty() && std::ranges::none_of(facts.sensors, is_used)) {
+    return {.because = "no measurement was used"};
+  }
+  const double p = facts.findings.empty() ? kAlone : kBesideFinding;
+  Verdict verdict = facts.nees.empty() ? WithoutTruth(facts) : FromNees(facts.nees, p);
   const bool is_wrong =
       verdict.basis == VerdictBasis::kNees && verdict.state != VerdictState::kConsistent;
   if (is_wrong) return verdict;
@@ -158,8 +176,13 @@ std::optional<VerdictState> VerdictStateOf(std::string_view name) {
 
 Verdict ComputeVerdict(const VerdictFacts& facts) {
   Verdict verdict = VerdictOf(facts);
-  if (std::ranges::find(facts.events, EventKind::kDigitsLost, &Event::kind) != facts.events.end()) {
-    verdict.because += "; sigmas may be wrong by rounding (event digits_lost)";
+  for (const EventKind kind :
+       {EventKind::kUnused, EventKind::kNoMeasurement, EventKind::kDigitsLost}) {
+    const auto event = std::ranges::find(facts.events, kind, &Event::kind);
+    if (event == facts.events.end()) continue;
+    verdict.because += kind == EventKind::kDigitsLost
+                           ? "; sigmas may be wrong by rounding (event digits_lost)"
+                           : "; " + event->text;
   }
   return verdict;
 }

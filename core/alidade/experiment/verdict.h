@@ -10,9 +10,11 @@
 #include <string_view>
 #include <vector>
 
+#include "alidade/base/enum_table.h"
 #include "alidade/base/timestamp.h"
 #include "alidade/estimation/event.h"
 #include "alidade/experiment/diagnosis.h"
+#include "alidade/experiment/measurement_log.h"
 
 namespace alidade {
 
@@ -55,15 +57,8 @@ inline constexpr std::array kVerdicts = {
     VerdictInfo{VerdictState::kConsistent, "consistent",
                 "the tests by NEES and NIS, or without truth by NIS, were passed"},
 };
-
-static_assert(
-    [] {
-      for (std::size_t i = 0; i < kVerdicts.size(); ++i) {
-        if (kVerdicts[i].state != static_cast<VerdictState>(i)) return false;
-      }
-      return kVerdicts.back().state == VerdictState::kConsistent;
-    }(),
-    "kVerdicts must have one entry for each VerdictState, in the order of VerdictState");
+static_assert(internal::HasEntryForEach(kVerdicts, &VerdictInfo::state, VerdictState::kConsistent),
+              "kVerdicts must have one entry for each VerdictState, in the order of VerdictState");
 
 /// Data that a verdict is based on.
 enum class VerdictBasis { kNone, kNis, kNees };
@@ -92,14 +87,6 @@ struct NeesSeries {
   std::vector<double> values;  ///< e' C^-1 e / dof, evenly thinned
 };
 
-/// Use of the measurements of a sensor over a run.
-struct SensorUse {
-  std::string sensor;
-  std::int64_t used = 0, rejected = 0;
-  std::int64_t rejected_in_a_row = 0;       ///< rejections since the last used measurement
-  Timestamp rejected_since = kNoTimestamp;  ///< time of the first of these rejections
-};
-
 /// Facts about a run that determine the verdict.
 struct VerdictFacts {
   bool failed = false, diverged = false;
@@ -111,11 +98,10 @@ struct VerdictFacts {
   int tested_sensors = 0;                  ///< sensors whose size of innovations was tested
 };
 
-/// Computes the verdict. The mean of n values of NEES / dof is too large if it exceeds the quantile
-/// of chi2(nu) / nu of probability 1 - 8e-7 and is at least 1.15^2. It is too small if it is below
-/// the quantile of probability 8e-7 and at most 1.15^-2. nu = dof n / (5 tau) with the
-/// autocorrelation time; the factor 5 allows for slow components that a short run hides. nu = dof
-/// if the values are nearly constant. If the NEES passes, or without truth, findings about the size
+/// Computes the verdict. TestScale tests the mean of n values of NEES / dof, as the mean of
+/// n / (5 tau) independent values. tau is the autocorrelation time; the factor 5 allows for slow
+/// components that a short run hides. Values that are nearly constant count as one. With a finding
+/// about the innovations, the test is stricter. If the NEES passes, or without truth, findings about the size
 /// of the innovations determine the verdict. The reason is then the first finding, which usually
 /// explains the others.
 Verdict ComputeVerdict(const VerdictFacts& facts);

@@ -52,6 +52,14 @@ class NumberRows {
     }
     return false;
   }
+  /// Returns the index of the cell of a header row that contains `name`. Fails if the header does
+  /// not contain it; the message contains `expected`, a description of the file.
+  std::size_t ColumnOf(std::string_view name, std::string_view expected) const {
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (text(i) == name) return i;
+    }
+    FailLine("the column '" + std::string(name) + "' is missing", expected);
+  }
   /// Fails unless the row has `count` columns. The message contains `columns`, which describes
   /// the expected columns.
   void ExpectColumns(std::size_t count, const std::string& columns) const {

@@ -126,6 +126,7 @@ Space ToSpace(const AlidadeSpace& source) {
   for (std::size_t i = 0; i < source.part_count; ++i) {
     const Space part = ToSpace(PartOf(source, i));
     space.parts.push_back(part.name);
+    space.part_units.push_back(part.unit);
     for (const std::string& name : ColumnNames(part.name, part)) space.elements.push_back(name);
   }
   return space;

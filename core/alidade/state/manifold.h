@@ -118,8 +118,9 @@ struct Space {
   std::string doc;
   std::vector<std::string> elements;  ///< names of the ambient elements; {""} for a scalar
   Geometry geometry;
-  unsigned flags = 0;                   ///< ALIDADE_ROLE_*
-  std::vector<std::string> parts = {};  ///< names of the parts of a product
+  unsigned flags = 0;                        ///< ALIDADE_ROLE_*
+  std::vector<std::string> parts = {};       ///< names of the parts of a product
+  std::vector<std::string> part_units = {};  ///< units of the parts of a product
 
   bool optional() const { return (flags & ALIDADE_ROLE_OPTIONAL) != 0; }
   bool landmark() const { return (flags & ALIDADE_ROLE_LANDMARK) != 0; }

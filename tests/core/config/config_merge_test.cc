@@ -69,6 +69,9 @@ TEST(ConfigSet, ANewEntryIsAWholeMap) {
   EXPECT_EQ(error("estimators.efk.gate", "0.9"),
             "--set estimators.efk.gate: estimator 'efk' does not exist; expected ekf, or a whole "
             "new entry, as in estimators.efk={KEY: VALUE}; did you mean 'ekf'?");
+  EXPECT_EQ(error("estimators.efk.type", "iekf"),
+            "--set estimators.efk.type: estimator 'efk' does not exist; expected ekf, or a whole "
+            "new entry, as in estimators.efk={KEY: VALUE}; did you mean 'ekf'?");
   EXPECT_EQ(error("sensors.gps.sigma_m", "1"),
             "--set sensors.gps.sigma_m: sensor 'gps' does not exist; expected a whole new entry, "
             "as in sensors.gps={KEY: VALUE}");

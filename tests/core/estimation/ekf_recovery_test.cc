@@ -17,6 +17,22 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
+/// Returns the problem with the depth 3 m and the sigma 1 mm. The disparity 65, which means 0.4 m,
+/// is far outside the gate.
+Problem WithWrongDepth(Problem problem) {
+  problem.priors[0].mean = {3.0};
+  problem.priors[0].covariance(0, 0) = 1e-6;
+  return problem;
+}
+
+/// Returns a constant p.x = 0, whose sigma is 0.01, and a sensor that measures it with sigma 0.01.
+Problem KnownConstant() {
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 0.01}});
+  AddSensor(problem, "z", LinearSensor(1.0, 0.01), {"p.x"});
+  return problem;
+}
+
 // Tests fault 76 of tests/faults/README.md.
 TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
   Problem problem;
@@ -213,9 +229,7 @@ TEST(Ekf, AMeasurementThatIsNotFiniteIsNotUsed) {
 
 // Tests fault 77 of tests/faults/README.md.
 TEST(Ekf, ASensorThatIsRejectedRepeatedlyResetsItsBlockFromTheMeasurement) {
-  Problem problem = DepthFilter();
-  problem.priors[0].mean = {3.0};
-  problem.priors[0].covariance(0, 0) = 1e-6;
+  const Problem problem = WithWrongDepth(DepthFilter());
   EkfOptions options;
   options.gate = 0.999;
   Ekf ekf(problem, options, StreamsOf(problem));
@@ -269,9 +283,7 @@ TYPED_TEST_SUITE(EveryFilter, Filters);
 
 // The disparity 65 implies the depth 0.4, and its sigma 0.4^2 / 26. 20 measurements are rejected.
 TYPED_TEST(EveryFilter, ResetsABlockAndThenAcceptsItsMeasurements) {
-  Problem problem = DepthFilter();
-  problem.priors[0].mean = {3.0};
-  problem.priors[0].covariance(0, 0) = 1e-6;
+  const Problem problem = WithWrongDepth(DepthFilter());
   TypeParam filter = MakeFilter<TypeParam>(problem);
   for (int k = 0; k < 20; ++k) filter.Process(FrameAt(0.0, {{0, 65.0}}));
   EXPECT_NEAR(ValueOf(filter.state(), "target.depth"), 0.4, 1e-12);
@@ -288,9 +300,7 @@ TYPED_TEST(EveryFilter, ResetsABlockAndThenAcceptsItsMeasurements) {
 // The sigma of x is 0.01 at first, and the jump is 10. At the third attempt, after 12 rejections,
 // the sigma is 10.
 TYPED_TEST(EveryFilter, InflatesUntilAMeasurementIsAccepted) {
-  Problem problem;
-  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 0.01}});
-  AddSensor(problem, "z", LinearSensor(1.0, 0.01), {"p.x"});
+  const Problem problem = KnownConstant();
   EkfOptions options;
   options.rejection_recovery = RejectionRecovery::kInflate;
   options.rejection_recovery_after = 3;
@@ -310,9 +320,7 @@ TYPED_TEST(EveryFilter, InflatesUntilAMeasurementIsAccepted) {
 // The smoother treats the data before and after the reset separately: later measurements do not
 // change earlier estimates.
 TEST(RtsSmoother, ARecoveryEndsTheSmoothingOfEarlierFrames) {
-  Problem problem;
-  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 0.01}});
-  AddSensor(problem, "z", LinearSensor(1.0, 0.01), {"p.x"});
+  const Problem problem = KnownConstant();
   EkfOptions options;
   options.rejection_recovery_after = 3;
   RtsSmoother rts = MakeFilter<RtsSmoother>(problem, options);
@@ -328,9 +336,7 @@ TEST(RtsSmoother, ARecoveryEndsTheSmoothingOfEarlierFrames) {
 }
 
 TEST(Ekf, RecoversAfterATimeIfTheSensorIsSlow) {
-  Problem problem;
-  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 0.01}});
-  AddSensor(problem, "z", LinearSensor(1.0, 0.01), {"p.x"});
+  const Problem problem = KnownConstant();
   EkfOptions options;
   options.rejection_recovery_after_s = 3.0;
   Ekf ekf = MakeFilter<Ekf>(problem, options);
@@ -531,9 +537,7 @@ TEST(Ekf, AHeldRoleIsExactWhereABlockStartsFromIt) {
 
 TEST(Ekf, ASensorThatIsRejectedRepeatedlyOfFixedBlocksInflatesNothing) {
   const auto event_of = [](BlockStatus status) {
-    Problem problem = WithStatus(DepthFilter(), "target.depth", status);
-    problem.priors[0].mean = {3.0};
-    problem.priors[0].covariance(0, 0) = 1e-6;
+    const Problem problem = WithWrongDepth(WithStatus(DepthFilter(), "target.depth", status));
     EkfOptions options;
     options.gate = 0.999;
     options.rejection_recovery = RejectionRecovery::kInflate;
@@ -550,9 +554,8 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyOfFixedBlocksInflatesNothing) {
 }
 
 TEST(Ekf, AResetLeavesConsideredBlocksAsTheyAre) {
-  Problem problem = WithStatus(DepthFilter(), "target.depth_rate", BlockStatus::kConsider);
-  problem.priors[0].mean = {3.0};
-  problem.priors[0].covariance(0, 0) = 1e-6;
+  const Problem problem =
+      WithWrongDepth(WithStatus(DepthFilter(), "target.depth_rate", BlockStatus::kConsider));
   EkfOptions options;
   options.gate = 0.999;
   Ekf ekf(problem, options, StreamsOf(problem));

@@ -41,6 +41,14 @@ TEST(UnobservableDirections, AHeldBlockIsNotEstimated) {
   EXPECT_EQ(directions[0], Names{"template.inverse_distance"});
 }
 
+TEST(UnobservableDirections, AreUnknownIfASensorIsNotDefinedAtThePrior) {
+  Problem problem = testing::DepthFilter();
+  for (Prior& prior : problem.priors) {
+    if (problem.layout[prior.block].name == "target.depth") prior.mean = {-0.3};
+  }
+  EXPECT_TRUE(UnobservableDirections(problem).empty());
+}
+
 TEST(UnobservableDirections, WhereNothingMeasuresNothingIsSeen) {
   Problem problem = testing::DepthFilter();
   problem.sensors.clear();

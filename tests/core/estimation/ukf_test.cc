@@ -143,6 +143,34 @@ TEST(Ukf, DoesNotReportABeaconThatIsFarEnough) {
   EXPECT_TRUE(ukf.Process(FrameAt(0.0, {{0, 3.0}})).events.empty());
 }
 
+/// Measures x^2 - y^2, whose curvatures cancel in the mean if x and y have the same variance.
+struct Saddle : Sensor<Vec<1>, Vec<2>> {
+  static constexpr std::array kRoles{Quantity{"p", "m", "", "x,y"}};
+  static constexpr Quantity kMeasurement{"saddle", "m^2"};
+  template <class T>
+  bool Predict(const T* p, T* z) const {
+    z[0] = p[0] * p[0] - p[1] * p[1];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.1);
+  }
+};
+
+TEST(Ukf, DoesNotReportCurvaturesThatCancelInTheMean) {
+  Problem problem;
+  MotionBinding binding{"p", testing::ConstantMotion(2), {}};
+  binding.blocks.push_back(problem.layout.Declare("p.x", "p", binding.model->blocks()[0]));
+  problem.priors.push_back({0, {0.0, 0.0}, Eigen::Matrix2d::Identity(), ""});
+  problem.motions.push_back(binding);
+  AddSensor(problem, "saddle", MakeSensor(Saddle{}, "saddle"), {"p.x"});
+  Ukf ukf(problem, {}, StreamsOf(problem));
+  for (const Event& event : ukf.Process(FrameAt(0.0, {{0, 0.0}})).events) {
+    EXPECT_NE(event.kind, EventKind::kNonlinear) << event.text;
+  }
+}
+
 /// Motion model of an orientation that rotates by a random w ~ N(0, sigma^2 I) in each step: q' = q
 /// Exp(w).
 struct TurningOrientation : Motion<3, UnitQuaternion> {

@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "alidade/base/statistics.h"
+#include "alidade/experiment/diagnosis_rules.h"
 
 namespace alidade {
 namespace {
@@ -37,6 +39,7 @@ InnovationSeries MakeSeries(int dof, int size, const Change& change, unsigned se
   for (int k = 0; k < dof; ++k) {
     series.units.emplace_back("m");
     series.z_index.push_back(k);
+    series.is_angle.push_back(0);
   }
   const auto m = static_cast<std::size_t>(dof);
   for (int i = 0; i < size; ++i) {
@@ -225,6 +228,63 @@ TEST(Diagnose, EstimatesTheTimeOffset) {
   EXPECT_TRUE(Contains(finding.text, "ms after their timestamps")) << finding.text;
 }
 
+/// Returns the series of a compass that turns at 0.7 rad/s, and whose measurements are 50 ms late.
+InnovationSeries LateCompass() {
+  InnovationSeries series = MakeSeries(1, 300, [](Sample& s, int i, std::mt19937&) {
+    s.s[0] = 0.02;
+    s.h[0] = 0.5 * std::sin(0.05 * i) + 0.07 * i;
+    s.u[0] += 0.05 * (0.25 * std::cos(0.05 * i) + 0.7) / s.s[0];
+  });
+  series.units = {"rad"};
+  series.is_angle = {1};
+  for (double& angle : series.z) angle = Angle::Wrap(angle);
+  for (double& angle : series.h) angle = Angle::Wrap(angle);
+  return series;
+}
+
+TEST(Diagnose, TheRateOfAnAngleHasNoJumps) {
+  EXPECT_TRUE(Contains(FindingOf(LateCompass(), FindingKind::kTimeOffset).text,
+                       "ms after their timestamps"));
+}
+
+TEST(Diagnose, DoesNotTakeAWrappedAngleForAWrongSign) {
+  InnovationSeries series = MakeSeries(1, 100, [](Sample& s, int, std::mt19937&) {
+    s.s[0] = 0.01;
+    s.h[0] = std::numbers::pi - 0.05;
+    s.u[0] += 10.0;
+  });
+  for (double& angle : series.z) angle = Angle::Wrap(angle);
+  EXPECT_TRUE(Has(series, FindingKind::kUnit)) << "as a number, z is -h";
+  series.is_angle = {1};
+  EXPECT_FALSE(Has(series, FindingKind::kUnit));
+}
+
+/// Returns a series whose sensor measures h = 20 + 4 sin(t) late by the offset. The sigma is 0.1 m,
+/// and the time step is 0.1 s. The rate of h has the standard deviation 4 / sqrt(2) m/s.
+InnovationSeries LateSeries(double offset_s, int size) {
+  return MakeSeries(1, size, [=](Sample& s, int i, std::mt19937&) {
+    s.s[0] = 0.1;
+    s.h[0] = 20.0 + 4.0 * std::sin(0.1 * i);
+    s.u[0] += offset_s * 4.0 * std::cos(0.1 * i - 0.05) / s.s[0];
+  });
+}
+
+// Other errors also make innovations proportional to the rate.
+TEST(Diagnose, ReportsATimeOffsetUpToThreeTimeSteps) {
+  EXPECT_TRUE(Has(LateSeries(0.28, 300), FindingKind::kTimeOffset));
+  EXPECT_TRUE(Has(LateSeries(-0.28, 300), FindingKind::kTimeOffset));
+  EXPECT_FALSE(Has(LateSeries(0.33, 300), FindingKind::kTimeOffset));
+  EXPECT_FALSE(Has(LateSeries(-0.33, 300), FindingKind::kTimeOffset));
+}
+
+// An offset of 3 ms changes the innovations by 0.003 * 4 / sqrt(2) / 0.1 = 0.085 sigma, and one of
+// 4 ms by 0.113 sigma. The limit is 0.1 sigma. With 20 000 measurements, both are significant:
+// 0.085 sqrt(20 000) = 12.
+TEST(Diagnose, IgnoresATimeOffsetThatIsSignificantButSmall) {
+  EXPECT_FALSE(Has(LateSeries(0.003, 20'000), FindingKind::kTimeOffset));
+  EXPECT_TRUE(Has(LateSeries(0.004, 20'000), FindingKind::kTimeOffset));
+}
+
 TEST(Diagnose, FindsNoiseThatDependsOnTheMeasuredQuantity) {
   const InnovationSeries series = MakeSeries(
       1, 400, [](Sample& s, int, std::mt19937&) { Scale(s, std::pow(s.h[0] / 20.0, 3.0)); });
@@ -238,6 +298,74 @@ TEST(Diagnose, FindsAPriorThatIsFarOff) {
   const Finding finding = FindingOf(series, FindingKind::kPriorFar);
   EXPECT_NEAR(std::sqrt(finding.statistic), 40.0, 4.0);
   EXPECT_EQ(DiagnoseOne(series).front().kind, FindingKind::kPriorFar) << "it explains the others";
+}
+
+// The quantile of chi-square for a false alarm of 1e-6 corresponds to 5.1 sigma. The median of NIS
+// increases this limit, but at most by the factor 4.
+TEST(Diagnose, ReportsThePriorOnlyIfTheFirstInnovationsAreLargerThanTheOthers) {
+  const auto series_of = [](double first, double others) {
+    return MakeSeries(1, 100, [=](Sample& s, int i, std::mt19937&) {
+      if (i < 3) s.u[0] = i == 0 ? first : 0.0;
+      if (i >= 3) Scale(s, others);
+    });
+  };
+  EXPECT_TRUE(Has(series_of(8.0, 1.0), FindingKind::kPriorFar));
+  EXPECT_FALSE(Has(series_of(8.0, 3.0), FindingKind::kPriorFar));
+  EXPECT_TRUE(Has(series_of(25.0, 3.0), FindingKind::kPriorFar));
+  EXPECT_TRUE(Has(series_of(25.0, 30.0), FindingKind::kPriorFar)) << "the factor is at most 4";
+}
+
+// Later measurements agree with their predictions, because the state has adapted to the first one.
+TEST(Diagnose, ComparesTheFirstMeasurementWithThePriorToFindAUnit) {
+  const auto first = [](double h, double ratio) {
+    return MakeSeries(1, 100, [=](Sample& s, int i, std::mt19937&) {
+      if (i > 0) return;
+      s.h[0] = h;
+      SetMeasurement(s, 0, ratio * h);
+    });
+  };
+  const Finding finding = FindingOf(first(20.0, 1000.0), FindingKind::kUnit);
+  EXPECT_TRUE(Contains(finding.text, "the first measurement is 1000 times its prediction"))
+      << finding.text;
+  EXPECT_FALSE(Has(first(0.1, 1000.0), FindingKind::kUnit)) << "0.2 sigma: the prediction may be 0";
+  EXPECT_TRUE(Has(first(0.1, 1000.0), FindingKind::kPriorFar));
+  EXPECT_FALSE(Has(first(20.0, 7.0), FindingKind::kUnit)) << "7 is not the factor of a unit";
+}
+
+// A large factor may differ by exp(0.35) = 1.42. A small one, such as that between km/h and m/s, is
+// also the ratio of two usual values of sigma.
+TEST(UnitHint, NamesALargeFactorBetweenTwoUnits) {
+  const std::string metres = " (near the factor between mm and m, or between ms and s)";
+  EXPECT_EQ(internal::UnitHint(1000.0, ""), metres);
+  EXPECT_EQ(internal::UnitHint(1.0 / 720.0, ""), metres);
+  EXPECT_EQ(internal::UnitHint(690.0, ""), "");
+  EXPECT_EQ(internal::UnitHint(50.0, ""), " (near the factor between degrees and rad)");
+  EXPECT_EQ(internal::UnitHint(1e9, ""), " (near the factor between ns and s)");
+  EXPECT_EQ(internal::UnitHint(3.6, ""), "");
+  EXPECT_EQ(internal::UnitHint(1.0, ""), "");
+}
+
+TEST(UnitHint, NamesOnlyFactorsOfTheUnit) {
+  EXPECT_EQ(internal::UnitHint(60.0, "rad"), " (near the factor between degrees and rad)");
+  EXPECT_EQ(internal::UnitHint(60.0, "s"), " (near the factor between minutes and s)");
+  EXPECT_EQ(internal::UnitHint(60.0, "m"), "");
+  EXPECT_EQ(internal::UnitHint(90.0, "m"), " (near the factor between cm and m)");
+  EXPECT_EQ(internal::UnitHint(60.0, "px"), "");
+}
+
+TEST(Diagnose, NamesTheFactorBetweenTwoUnitsOfTheSizeOfInnovations) {
+  const std::string hint = " (near the factor between mm and m, or between ms and s)";
+  const InnovationSeries all =
+      MakeSeries(1, 200, [](Sample& s, int, std::mt19937&) { Scale(s, 1000.0); });
+  const std::string large = FindingOf(all, FindingKind::kOverconfident).text;
+  EXPECT_TRUE(Contains(large, hint)) << large;
+  const InnovationSeries small =
+      MakeSeries(1, 200, [](Sample& s, int, std::mt19937&) { Scale(s, 1.0 / 1000.0); });
+  EXPECT_TRUE(Contains(FindingOf(small, FindingKind::kUnderconfident).text, hint));
+  const InnovationSeries element =
+      MakeSeries(2, 200, [](Sample& s, int, std::mt19937&) { s.u[1] /= 1000.0; });
+  const std::string text = FindingOf(element, FindingKind::kElement).text;
+  EXPECT_TRUE(Contains(text, "for element 1" + hint)) << text;
 }
 
 TEST(Diagnose, NamesTheFactorBetweenTwoUnits) {
@@ -292,6 +420,40 @@ TEST(Diagnose, FindsTimesInMs) {
   EXPECT_FALSE(Has(far(33.0, false), FindingKind::kTimeUnit)) << "a slow sensor as predicted";
 }
 
+// The rule has no lower limit: the rate of a fast sensor is not known.
+TEST(Diagnose, ReportsTheUnitOfTheTimeOnlyIfTheMeanTimeStepIsLongerThanTenSeconds) {
+  const auto far = [](double step_s) {
+    return MakeSeries(1, 50, [=](Sample& s, int i, std::mt19937&) {
+      s.time_s = step_s * i;
+      s.outcome = Outcome::kOutOfDomain;
+    });
+  };
+  EXPECT_TRUE(Contains(FindingOf(far(10.1), FindingKind::kTimeUnit).text,
+                       "the mean time step is 10.1 s, and the innovations are not as predicted: "
+                       "the times may be in ms"));
+  EXPECT_FALSE(Has(far(9.9), FindingKind::kTimeUnit));
+  EXPECT_FALSE(Has(far(33e-6), FindingKind::kTimeUnit)) << "times in s that were taken for ms";
+}
+
+// Each of these changes is another sign of times in ms.
+TEST(Diagnose, FindsTimesInMsByTheSizeOfTheInnovationsThePriorOrRejections) {
+  const Change changes[] = {
+      [](Sample& s, int, std::mt19937&) { Scale(s, 10.0); },
+      [](Sample& s, int, std::mt19937&) { Scale(s, 0.1); },
+      [](Sample& s, int i, std::mt19937&) { s.u[0] += i == 0 ? 40.0 : 0.0; },
+      [](Sample& s, int i, std::mt19937&) {
+        if (i % 3 != 0) s.outcome = Outcome::kGated;
+      },
+  };
+  for (const Change& change : changes) {
+    const InnovationSeries series = MakeSeries(1, 50, [&](Sample& s, int i, std::mt19937& random) {
+      s.time_s = 33.0 * i;
+      change(s, i, random);
+    });
+    EXPECT_TRUE(Has(series, FindingKind::kTimeUnit)) << "change " << &change - changes;
+  }
+}
+
 TEST(Diagnose, FindsASensorModelThatIsNotDefinedAtTheEstimate) {
   const auto share = [](int defined) {
     return MakeSeries(1, 100, [=](Sample& s, int i, std::mt19937&) {
@@ -329,6 +491,39 @@ TEST(Diagnose, FindsExchangedElements) {
   EXPECT_TRUE(Contains(finding.text, "elements 0 and 1")) << finding.text;
   series.units = {"m", "rad"};
   EXPECT_FALSE(Has(series, FindingKind::kSwapped)) << "elements with different units";
+}
+
+/// Changes the measurements from `first` to before `last` to 20 m. The predictions still vary.
+Change Repeated(int first, int last) {
+  return [=](Sample& s, int i, std::mt19937&) {
+    if (i >= first && i < last) SetMeasurement(s, 0, 20.0);
+  };
+}
+
+TEST(Diagnose, FindsASensorThatRepeatsAMeasurement) {
+  const Finding finding = FindingOf(MakeSeries(1, 100, Repeated(40, 61)), FindingKind::kStuck);
+  EXPECT_EQ(finding.statistic, 20.0) << "repetitions of the first of 21 equal measurements";
+  EXPECT_TRUE(Contains(finding.text, "the measurement at 4 s was repeated 20 times"))
+      << finding.text;
+  EXPECT_FALSE(Has(MakeSeries(1, 100, Repeated(40, 60)), FindingKind::kStuck)) << "19 repetitions";
+}
+
+// For example, a sensor that measures that the velocity is zero.
+TEST(Diagnose, ASensorThatAlwaysMeasuresTheSameIsNotStuck) {
+  EXPECT_FALSE(Has(MakeSeries(1, 100, Repeated(0, 100)), FindingKind::kStuck));
+  EXPECT_TRUE(Has(MakeSeries(1, 100, Repeated(1, 100)), FindingKind::kStuck));
+}
+
+TEST(Diagnose, NamesTheElementThatIsStuck) {
+  const Finding finding = FindingOf(MakeSeries(2, 100, Repeated(40, 80)), FindingKind::kStuck);
+  EXPECT_TRUE(Contains(finding.text, "element 0 of the measurement at 4 s")) << finding.text;
+}
+
+// Measurements of several landmarks alternate, and a landmark may have a constant direction.
+TEST(Diagnose, MeasurementsOfLandmarksAreNotStuck) {
+  InnovationSeries series = MakeSeries(1, 100, Repeated(40, 80));
+  series.landmarks.assign(series.size(), 7);
+  EXPECT_FALSE(Has(series, FindingKind::kStuck));
 }
 
 TEST(Diagnose, TestsTheNoiseOnlyIfThereAreEnoughFrames) {

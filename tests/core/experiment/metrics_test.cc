@@ -45,9 +45,15 @@ class FakeSource : public Source {
 /// Computes the metrics of one estimator. The test sets the states of the estimator.
 class MetricsOf {
  public:
-  MetricsOf(const StateLayout& layout, const std::vector<StreamInfo>& truths, int segments = 0)
+  /// `prior_sigma` is the sigma of the prior of block 0; 0: it has no prior.
+  MetricsOf(const StateLayout& layout, const std::vector<StreamInfo>& truths, int segments = 0,
+            double prior_sigma = 0.0)
       : source_(truths), state_(layout) {
     named_.problem.layout = layout;
+    if (prior_sigma > 0.0) {
+      named_.problem.priors.push_back(
+          {0, {0.0}, Eigen::MatrixXd::Constant(1, 1, prior_sigma * prior_sigma), ""});
+    }
     const SharedSensor sensor = MakeSensor(StereoDisparity(400.0, 0.065, 1.0), "stereo_disparity");
     named_.problem.sensors.push_back({"stereo", "disparity", sensor, {}});
     std::vector<Segment> list;
@@ -390,6 +396,16 @@ TEST(Metrics, AKnownValueIsNotInconsistent) {
   one.state().Add(0, &zero, Eigen::MatrixXd::Zero(1, 1));
   for (int i = 0; i < 50; ++i) one.Add({{1e-17}});
   EXPECT_TRUE(one.metrics().events().empty());
+}
+
+TEST(Metrics, AVarianceOfTheSizeOfItsRoundingErrorsIsZero) {
+  for (const double variance : {1e-24, -1e-24}) {
+    MetricsOf one(Scalars({"a.x"}), {{"x", 1}}, 0, 1.0);
+    const double zero = 0.0;
+    one.state().Add(0, &zero, Eigen::MatrixXd::Constant(1, 1, variance));
+    for (int i = 0; i < 50; ++i) one.Add({{1e-6}});
+    EXPECT_TRUE(one.metrics().events().empty()) << variance;
+  }
 }
 
 TEST(Metrics, AFrameOlderThanTheStateHasNoError) {

@@ -16,7 +16,8 @@ namespace alidade {
 namespace {
 
 // A constant x with the prior N(0, p^2) is measured n times: z_k = x + b + N(0, sigma^2). The
-// covariance of all measurements is sigma^2 I + p^2 1 1', so the likelihood is known in closed form.
+// covariance of all measurements is sigma^2 I + p^2 1 1', so the likelihood is known in closed
+// form.
 constexpr double kSigma = 0.5, kPriorSigma = 2.0, kStep = 1e-4;
 
 using Data = std::vector<double>;

@@ -68,6 +68,28 @@ TEST(Verdict, IsTheFirstThatApplies) {
   EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kFailed);
 }
 
+TEST(Verdict, NamesTheEventThatEndedTheEstimator) {
+  const Event skipped{1, EventKind::kPluginFailed, "a measurement was skipped"};
+  Event diverged{7, EventKind::kDiverged, "out of domain"};
+  diverged.divergence = true;
+  const std::vector<Event> events = {skipped, diverged};
+  const Verdict verdict = ComputeVerdict({.diverged = true, .events = events});
+  EXPECT_EQ(verdict.because, "out of domain");
+  EXPECT_EQ(verdict.since, 7);
+}
+
+TEST(Verdict, CountsDependentValuesOfTheNeesAsOne) {
+  NeesSeries constant{"target", 3.0, std::vector<double>(100, 5.0)}, slow = constant;
+  for (int i = 0; i < 100; ++i) slow.values[i] = 0.1 * i;
+  const Verdict of_constant = ComputeVerdict({.nees = {&constant, 1}}),
+                of_slow = ComputeVerdict({.nees = {&slow, 1}});
+  EXPECT_EQ(of_constant.state, VerdictState::kConsistent);
+  EXPECT_NE(of_constant.because.find("5 (nearly constant)"), std::string::npos);
+  EXPECT_EQ(of_slow.state, VerdictState::kConsistent);
+  EXPECT_NE(of_slow.because.find("4.95 (strongly correlated)"), std::string::npos)
+      << of_slow.because;
+}
+
 TEST(Verdict, MentionsTheEventThatDigitsWereLost) {
   const NeesSeries nees = MakeNees(1.0, 200);
   const Event lost{5, EventKind::kDigitsLost, "a variance is lost by rounding"};
@@ -99,6 +121,31 @@ TEST(Verdict, CountsTheRejectionsAtTheEnd) {
   const Verdict verdict = ComputeVerdict({.sensors = {&use, 1}});
   EXPECT_EQ(verdict.state, VerdictState::kMostlyRejected);
   EXPECT_EQ(verdict.since, 3);
+}
+
+TEST(Verdict, IsNotTestedIfNoMeasurementWasUsed) {
+  const NeesSeries nees = MakeNees(1.0, 200);
+  const SensorUse unused{.sensor = "gnss"}, used{.sensor = "imu", .used = 1};
+  const Event event{kNoTimestamp, EventKind::kUnused, "sensor 'gnss' had no measurement"};
+  VerdictFacts facts{.events = {&event, 1}, .sensors = {&unused, 1}, .nees = {&nees, 1}};
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kNotTested);
+  EXPECT_EQ(ComputeVerdict(facts).because,
+            "no measurement was used; sensor 'gnss' had no measurement");
+  const std::vector<SensorUse> both = {unused, used};
+  facts.sensors = both;
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kConsistent);
+  EXPECT_TRUE(ComputeVerdict(facts).because.ends_with("; sensor 'gnss' had no measurement"));
+}
+
+// A mean NEES of 6 is not significant if all values count as one: chi2(1 - 8e-7; 3) / 3 = 10.4. It
+// is significant beside a finding: chi2(0.995; 3) / 3 = 4.3.
+TEST(Verdict, IsStricterIfThereIsAFinding) {
+  const NeesSeries slow{"target", 3.0, std::vector<double>(100, 6.0)};
+  VerdictFacts facts{.nees = {&slow, 1}};
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kConsistent);
+  const Finding finding{FindingKind::kCorrelated, "gnss", "successive innovations", 0.5};
+  facts.findings = {&finding, 1};
+  EXPECT_EQ(ComputeVerdict(facts).state, VerdictState::kOverconfident);
 }
 
 TEST(Verdict, UsesTheInnovationsWithoutTruth) {

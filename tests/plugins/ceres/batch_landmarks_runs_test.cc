@@ -46,7 +46,7 @@ TEST(CeresBatchLandmarks, WhatAFilterAcceptedEntersAtOnce) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
   for (const auto& [key, value] :
        std::map<std::string, std::string>{{"landmarks.min_observations", "3"},
-                                          {"estimators.batch.type", "ceres_batch"},
+                                          {"estimators.batch", "{type: ceres_batch}"},
                                           {"estimators.batch.use.accepted_by", "ekf"}}) {
     config.Set(key, value, "--set");
   }

@@ -22,7 +22,7 @@ RunResult RunDepth(int seed, const std::vector<std::pair<std::string, std::strin
 TEST(CeresBatch, SmoothsDepthToAMillimetre) {
   double rmse = 0.0, coverage = 0.0;
   for (int seed = 1001; seed <= 1020; ++seed) {
-    const RunResult run = RunDepth(seed, {{"estimators.batch.type", "ceres_batch"}});
+    const RunResult run = RunDepth(seed, {{"estimators.batch", "{type: ceres_batch}"}});
     ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
     const EstimatorResult& batch = run.estimators[1];
     EXPECT_FALSE(batch.diverged);
@@ -39,7 +39,7 @@ TEST(CeresBatch, TheFilterIsNearlyAsGoodAsFullInformation) {
   double filter = 0.0, full = 0.0;
   for (int seed = 1001; seed <= 1005; ++seed) {
     const RunResult run = RunDepth(
-        seed, {{"estimators.full.type", "ceres_batch"}, {"estimators.full.mode", "filtering"}});
+        seed, {{"estimators.full", "{type: ceres_batch}"}, {"estimators.full.mode", "filtering"}});
     ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
     filter += run.estimators[0].metrics.at("rmse:target.depth");
     full += run.estimators[1].metrics.at("rmse:target.depth");
@@ -57,7 +57,7 @@ bool HasEvent(const EstimatorResult& result, EventKind kind, const std::string& 
 
 TEST(CeresBatch, ASolveThatDoesNotConvergeIsAFailureAndAnEvent) {
   const RunResult run = RunDepth(
-      1, {{"estimators.batch.type", "ceres_batch"}, {"estimators.batch.max_iterations", "1"}});
+      1, {{"estimators.batch", "{type: ceres_batch}"}, {"estimators.batch.max_iterations", "1"}});
   EXPECT_EQ(run.status, RunStatus::kFailed);
   EXPECT_EQ(run.code, ExitCode::kDiverged);
   EXPECT_NE(run.reason.find("estimator 'batch': cost"), std::string::npos) << run.reason;
@@ -67,7 +67,7 @@ TEST(CeresBatch, ASolveThatDoesNotConvergeIsAFailureAndAnEvent) {
 
 TEST(CeresBatch, WhereNothingIsDefinedItSaysSoAndTheOthersGoOn) {
   const RunResult run =
-      RunDepth(1, {{"estimators.batch.type", "ceres_batch"},
+      RunDepth(1, {{"estimators.batch", "{type: ceres_batch}"},
                    {"estimators.batch.overrides.state.target.initial.depth.mean", "-1"},
                    {"estimators.batch.overrides.state.target.initial.depth.sigma", "0"},
                    {"estimators.batch.overrides.state.target.noise.acceleration", "0"}});
@@ -88,7 +88,7 @@ TEST_F(CeresBatchConfig, WhatItCannotDoIsRefusedByName) {
     ExpectError(ExitCode::kBadConfig,
                 {key + place + ": estimator type 'ceres_batch' does not support " + what + ';'},
                 [&] {
-                  RunDepth(1, {{"estimators.batch.type", "ceres_batch"}, {key, value}});
+                  RunDepth(1, {{"estimators.batch", "{type: ceres_batch}"}, {key, value}});
                 });
   };
   expect("sensors.scale.roles.inverse_distance", "{block: template.inverse_distance, mode: known}",
@@ -102,7 +102,8 @@ TEST_F(CeresBatchConfig, KeysOfTheFiltersAreRefusedByName) {
   const auto expect = [&](const std::string& key, const std::string& value,
                           const std::string& words) {
     ExpectError(ExitCode::kBadConfig, {"estimators.batch." + key + ": estimator type", words}, [&] {
-      RunDepth(1, {{"estimators.batch.type", "ceres_batch"}, {"estimators.batch." + key, value}});
+      RunDepth(1,
+               {{"estimators.batch", "{type: ceres_batch}"}, {"estimators.batch." + key, value}});
     });
   };
   expect("gate", "0.99", "'ceres_batch' has no gate; remove this key, or use type: ekf");
@@ -121,7 +122,7 @@ TEST_F(CeresBatchConfig, IsListedWithItsKeysAndThoseOfEveryEstimator) {
 
 TEST_F(CeresBatchConfig, BadOptionsAndTypesAreErrorsWithAPlace) {
   const auto run = [](const std::string& key, const std::string& value) {
-    RunDepth(1, {{"estimators.batch.type", "ceres_batch"}, {key, value}});
+    RunDepth(1, {{"estimators.batch", "{type: ceres_batch}"}, {key, value}});
   };
   ExpectError(ExitCode::kBadConfig, {"estimators.batch.mode", "some", "smoothing, filtering"},
               [&] { run("estimators.batch.mode", "some"); });
@@ -130,7 +131,7 @@ TEST_F(CeresBatchConfig, BadOptionsAndTypesAreErrorsWithAPlace) {
   ExpectError(ExitCode::kBadConfig, {"max_iteration", "did you mean 'max_iterations'?"},
               [&] { run("estimators.batch.max_iteration", "3"); });
   const auto incremental = [](const std::string& key, const std::string& value) {
-    RunDepth(1, {{"estimators.batch.type", "ceres_batch"},
+    RunDepth(1, {{"estimators.batch", "{type: ceres_batch}"},
                  {"estimators.batch.mode", "incremental"},
                  {"estimators.batch." + key, value}});
   };

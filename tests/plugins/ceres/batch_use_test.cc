@@ -115,7 +115,7 @@ RunResult RunDepth(const std::vector<std::pair<std::string, std::string>>& setti
 TEST(CeresBatchUse, IsReadFromTheConfig) {
   // The gate is narrow. The batch must use exactly the measurements that passed the gate.
   const RunResult run = RunDepth({{"estimators.ekf.gate", "0.5"},
-                                  {"estimators.batch.type", "ceres_batch"},
+                                  {"estimators.batch", "{type: ceres_batch}"},
                                   {"estimators.batch.use.accepted_by", "ekf"}});
   ASSERT_EQ(run.estimators.size(), 2u);
   EXPECT_GT(run.estimators[0].counts.at("gated:scale"), 10);
@@ -125,7 +125,7 @@ TEST(CeresBatchUse, IsReadFromTheConfig) {
 
 TEST(CeresBatchUse, AsTheReferenceGivesErrorsWithoutTruth) {
   const RunResult run =
-      RunDepth({{"estimators.batch.type", "ceres_batch"}, {"reference", "batch"}});
+      RunDepth({{"estimators.batch", "{type: ceres_batch}"}, {"reference", "batch"}});
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
   EXPECT_EQ(run.reference, "batch");
   EXPECT_EQ(run.estimators[1].metrics.count("rmse:target.depth"), 0u);
@@ -137,7 +137,7 @@ TEST(CeresBatchUse, AsTheReferenceGivesErrorsWithoutTruth) {
 }
 
 TEST(CeresBatchUse, ABatchThatDoesNotConvergeIsNoReference) {
-  const RunResult run = RunDepth({{"estimators.batch.type", "ceres_batch"},
+  const RunResult run = RunDepth({{"estimators.batch", "{type: ceres_batch}"},
                                   {"estimators.batch.max_iterations", "1"},
                                   {"reference", "batch"}});
   EXPECT_EQ(run.code, ExitCode::kDiverged);

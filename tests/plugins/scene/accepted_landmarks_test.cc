@@ -32,7 +32,7 @@ TEST(AcceptedBy, LandmarksEnterAtTheSameObservation) {
   for (const auto& [key, value] :
        std::map<std::string, std::string>{{"source.max_frames", "12"},
                                           {"landmarks.min_observations", "3"},
-                                          {"estimators.follower.type", "ekf"},
+                                          {"estimators.follower", "{type: ekf}"},
                                           {"estimators.follower.use.accepted_by", "ekf"}}) {
     config.Set(key, value, "--set");
   }

@@ -53,6 +53,19 @@ TEST(CompareReport, NamesNoRowsIfNoneIsLeftOut) {
   EXPECT_FALSE(Contains(CompareReport(comparison, TableStyle::kText, ReportRows::kMain), "--all"));
 }
 
+TEST(CompareReport, NamesTheVerdictOrCountsTheRunsWithIt) {
+  Comparison comparison = Compared("truth", {"rmse:p.x"});
+  auto& verdicts = comparison.estimators[0].verdicts;
+  verdicts[static_cast<std::size_t>(VerdictState::kConsistent)] = 1;
+  const std::string one = CompareReport(comparison, TableStyle::kText);
+  EXPECT_TRUE(Contains(one, "\nverdict   consistent\n")) << one;
+  comparison.runs = 20;
+  verdicts[static_cast<std::size_t>(VerdictState::kConsistent)] = 18;
+  verdicts[static_cast<std::size_t>(VerdictState::kLost)] = 2;
+  const std::string several = CompareReport(comparison, TableStyle::kText);
+  EXPECT_TRUE(Contains(several, "  2 lost, 18 consistent\n")) << several;
+}
+
 // With fewer than ten runs, the report states that there are too few, regardless of their interval.
 TEST(CompareReport, IntervalsOfFewRunsAreSaidToBeSo) {
   for (const std::int64_t runs : {3, 9, 10}) {

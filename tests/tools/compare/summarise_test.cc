@@ -16,6 +16,8 @@ Comparison OneRun(double error, bool filter_diverged = false) {
   ComparedEstimator& filter = one.estimators[0];
   filter.name = "ekf";
   filter.diverged = filter_diverged ? 1 : 0;
+  const VerdictState state = filter_diverged ? VerdictState::kDiverged : VerdictState::kConsistent;
+  filter.verdicts[static_cast<std::size_t>(state)] = 1;
   filter.values["rmse:x"] = {error, error, error, error};
   if (!filter_diverged) {
     filter.reference = filter.final_reference = "batch";
@@ -46,6 +48,16 @@ TEST(Summarise, LeavesOutTheRunsInWhichTheFilterDiverged) {
   EXPECT_EQ(filter.ratios.at("rmse:x").runs, 2);
   EXPECT_EQ(all.estimators[1].used, 3);
   EXPECT_EQ(all.decomposition[0].values.at("rejected").mean, 1.5);
+}
+
+TEST(Summarise, CountsTheVerdictsOfAllRuns) {
+  const Comparison all = Summarise({OneRun(6.0, true), OneRun(1.0), OneRun(2.0)});
+  const auto count_of = [&](VerdictState state) {
+    return all.estimators[0].verdicts[static_cast<std::size_t>(state)];
+  };
+  EXPECT_EQ(count_of(VerdictState::kDiverged), 1);
+  EXPECT_EQ(count_of(VerdictState::kConsistent), 2);
+  EXPECT_EQ(count_of(VerdictState::kLost), 0);
 }
 
 // If an estimator failed in one of the runs, the summary reports it.

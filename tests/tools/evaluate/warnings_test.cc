@@ -66,6 +66,52 @@ TEST(EvaluationWarnings, AScaleFarFromOneIsNoMetricScale) {
   EXPECT_EQ(WarningsOf(Curve(60), mono, Aligned(Alignment::kSim3)), "");
 }
 
+TEST(EvaluationWarnings, AScaleOfAUnitIsNamed) {
+  struct Case {
+    double scale;
+    const char* text;
+  };
+  for (const Case& c : {Case{1e-3, "is probably in mm;"},
+                        {1e-2, "is probably in cm;"},
+                        {0.3048, "is probably in feet;"},
+                        {1e3, "is probably in km;"},
+                        {1.03 * 0.3048, "probably has no metric scale;"}}) {
+    Similarity known;
+    known.scale = c.scale;
+    Trajectory estimate = Estimate(Curve(60));
+    estimate = Inverse(known) * estimate;
+    const std::string warnings = WarningsOf(Curve(60), estimate, Aligned(Alignment::kSe3));
+    EXPECT_NE(warnings.find(std::string("the estimate ") + c.text), std::string::npos) << warnings;
+  }
+}
+
+TEST(EvaluationWarnings, AnAxisWithTheOppositeDirectionIsNamed) {
+  Trajectory mirrored = Estimate(Curve(60));
+  mirrored.positions.row(1) *= -1.0;
+  const std::string warnings = WarningsOf(Curve(60), mirrored, Aligned(Alignment::kSe3));
+  EXPECT_NE(warnings.find("estimate.tum: the error with sim3 is 0.0"), std::string::npos)
+      << warnings;
+  EXPECT_NE(warnings.find(": an axis probably has the opposite direction; expected axes of a "
+                          "right-handed frame in both files\n"),
+            std::string::npos)
+      << warnings;
+}
+
+// In a plane, a reflection is a rotation. Both errors are then rounding errors, whose ratio is
+// arbitrary.
+TEST(EvaluationWarnings, PosesInAPlaneHaveNoReflection) {
+  for (int size = 20; size < 120; ++size) {
+    Trajectory flat = Curve(size);
+    flat.positions.row(2).setZero();
+    Trajectory mirrored = flat;
+    mirrored.positions.row(1) *= -1.0;
+    for (const Trajectory& estimate : {flat, mirrored}) {
+      const std::string warnings = WarningsOf(flat, estimate, Aligned(Alignment::kSe3));
+      EXPECT_EQ(warnings.find("mirrored"), std::string::npos) << warnings;
+    }
+  }
+}
+
 TEST(EvaluationWarnings, AnErrorThatAlignmentTakesAwayIsOfAnotherWorld) {
   const Similarity known{1.0, Turn(0.5).toRotationMatrix(), Vector3d(3.0, 4.0, 0.0)};
   const Trajectory estimate = Estimate(Inverse(known) * Curve(60));
@@ -214,6 +260,30 @@ TEST(EvaluationWarnings, QuaternionsInTheOtherOrderAreToldOfWithTheirFile) {
   warnings = WarningsOf(Curve(60), estimate);
   EXPECT_NE(warnings.find("are read with w last, but only to "), std::string::npos) << warnings;
   EXPECT_TRUE(warnings.ends_with("expected qw qx qy qz\n")) << warnings;
+}
+
+// The orientations of a body that turns about z only fit if either file is read in the other order.
+TEST(EvaluationWarnings, AnAmbiguousOrderOfQuaternionsIsToldOfWithBothFiles) {
+  Trajectory reference = Curve(60);
+  for (std::size_t i = 0; i < 60; ++i) {
+    const double half = 0.15 + 0.025 * static_cast<double>(i);
+    reference.orientations[i] = Eigen::Quaterniond(std::cos(half), 0.0, 0.0, std::sin(half));
+  }
+  Trajectory swapped = Estimate(reference);
+  for (Eigen::Quaterniond& q : swapped.orientations) {
+    q = Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y());
+  }
+  for (const bool is_reference_wrong : {false, true}) {
+    Trajectory first = is_reference_wrong ? swapped : reference,
+               second = is_reference_wrong ? reference : swapped;
+    first.name = "reference.tum";
+    second.name = "estimate.tum";
+    const std::string warnings = WarningsOf(first, second);
+    EXPECT_TRUE(warnings.starts_with("estimate.tum:")) << warnings;
+    EXPECT_NE(warnings.find(" deg with w last; the other order of reference.tum fits as well"),
+              std::string::npos)
+        << warnings;
+  }
 }
 
 TEST(EvaluationWarnings, ASwapOfReferenceAndEstimateIsSeenByTheirNames) {

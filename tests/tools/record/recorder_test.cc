@@ -349,6 +349,9 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
           "z_index": [
             0
           ],
+          "is_angle": [
+            false
+          ],
           "robust_loss": false,
           "landmark_prior": false
         },
@@ -358,6 +361,9 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
           ],
           "z_index": [
             0
+          ],
+          "is_angle": [
+            false
           ],
           "robust_loss": false,
           "landmark_prior": false

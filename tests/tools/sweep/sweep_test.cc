@@ -156,8 +156,8 @@ TEST(Sweep, ItsRunsShareTheirNames) {
   }
 }
 
-// The values are 1, 2 and 6, so s = sqrt(7). The half width of the interval is 4.303 s / sqrt(3)
-// = 6.573.
+// The values are 1, 2 and 6, so s = sqrt(7). The half width of the interval is 4.3027 s / sqrt(3)
+// = 6.572.
 TEST(SweepTable, HasCountsOfVerdictsAndLabelledStatistics) {
   EXPECT_EQ(
       TableOf(SixRuns()),
@@ -170,7 +170,7 @@ TEST(SweepTable, HasCountsOfVerdictsAndLabelledStatistics) {
       "\n"
       "Mean over the used runs, 95 % interval of this mean, and quantiles over the used runs:\n"
       "        estimator   mean    95 % interval    5 %  median   95 %\n"
-      "rmse x        ekf  3.000  [-3.573, 9.573]  1.100   2.000  5.600\n");
+      "rmse x        ekf  3.000  [-3.572, 9.572]  1.100   2.000  5.600\n");
 }
 
 TEST(SweepTable, ReportsAMeanNeesThatFailsOverTheRuns) {
@@ -193,6 +193,16 @@ TEST(SweepTable, ReportsAMeanNeesThatFailsOverTheRuns) {
                            "filter may be slightly overconfident. (95 % bounds [0.206, 2.41])\n"),
       std::string::npos)
       << TableOf(result);
+}
+
+TEST(SweepTable, CountsTheRunsThatHaveTheMetric) {
+  SweepResult result = SixRuns();
+  result.done[0].estimators[0] =
+      Add(result.done[0].estimators[0], {{"nees.mean:x", 9.0}, {"nees.dof:x", 2.0}});
+  const std::string table = TableOf(result);
+  EXPECT_EQ(table.find("nan"), std::string::npos) << table;
+  // One run has two degrees of freedom: chi2(1 - 8e-7; 2) / 2 = 14.
+  EXPECT_EQ(table.find("is expected"), std::string::npos) << table;
 }
 
 TEST(SweepTable, HasARowForEachEstimator) {

@@ -274,6 +274,7 @@ ComparedEstimator Compare(const Candidate& estimator, const References& referenc
   compared.units = result.units;
   compared.used = 1;
   compared.diverged = result.diverged ? 1 : 0;
+  compared.verdicts[static_cast<std::size_t>(result.verdict.state)] = 1;
   for (const internal::SeriesBlock& block : estimator.series.blocks) {
     if (!block.unit.empty()) compared.units[block.name] = block.unit;
   }

@@ -44,6 +44,6 @@ std::vector<DecompositionStep> Decompose(const Candidate& filter,
                                          const std::vector<Candidate>& candidates, bool with_truth);
 
 /// Returns the spread of a single value.
-inline Spread SingleValue(double value) { return {value, value, value, value}; }
+inline Spread SingleValue(double value) { return {value, value, value, value, 1}; }
 
 }  // namespace alidade::internal

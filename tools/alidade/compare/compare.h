@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -10,6 +11,7 @@
 
 #include "alidade/compare/over_seeds.h"
 #include "alidade/experiment/run.h"
+#include "alidade/experiment/verdict.h"
 #include "alidade/sweep/sweep.h"
 
 /// Comparison of estimators over the same data, and decomposition of the differences between them
@@ -76,8 +78,10 @@ struct ComparedEstimator {
   std::map<std::string, std::string> units;  ///< units of blocks
   std::int64_t used = 0;                     ///< number of runs from which the values are computed
   std::int64_t diverged = 0;                 ///< number of runs in which the estimator diverged
-  ErrorSeries series;                        ///< errors, if the run is one of several seeds
-  OverTime over_time;                        ///< averages over several runs
+  /// Number of runs with each verdict, in the order of kVerdicts.
+  std::array<std::int64_t, kVerdicts.size()> verdicts{};
+  ErrorSeries series;  ///< errors, if the run is one of several seeds
+  OverTime over_time;  ///< averages over several runs
   /// Intervals of the mean errors over several runs, by key. An interval contains the mean with
   /// probability 0.95.
   std::map<std::string, Interval> mean_intervals = {};

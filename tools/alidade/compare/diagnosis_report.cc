@@ -31,17 +31,19 @@ std::string AlarmText(const ParameterTest& test) {
                                  : " has almost the same effect as " + test.alternative_to;
   return "  " + test.key + " is " + RoundedText(test.value, 4) + ", but " +
          RoundedText(test.better, 3) + effect + " (|z| = " + RoundedText(std::abs(test.z), 3) +
-         ", log-likelihood +" + RoundedText(test.gain, 3) + "): --set '" + test.setting + "'\n";
+         ", log-likelihood +" + RoundedText(test.gain, 3) + "); try --set '" + test.setting + "'\n";
 }
 
 /// Returns a sentence for an estimator without an alarm. `tests` are sorted.
 std::string NoAlarmText(const std::vector<ParameterTest>& tests) {
   const auto count = std::ranges::count(tests, std::string(), &ParameterTest::not_tested);
   if (count == 0) return "  no parameter could be tested\n";
-  return "  no other value of a parameter explains the innovations better: the largest |z| of " +
+  return "  no other value of a parameter explains the innovations significantly better: the "
+         "largest "
+         "|z| of " +
          std::to_string(count) + (count == 1 ? " parameter" : " parameters") + " is " +
          RoundedText(std::abs(tests.front().z), 3) + " (" + tests.front().key +
-         "), and an error exceeds " + RoundedText(kParameterAlarm) + '\n';
+         "), which is below the threshold of " + RoundedText(kParameterAlarm) + '\n';
 }
 
 internal::Json ParametersJson(const ParameterTests& tests) {
@@ -83,7 +85,12 @@ std::string ParameterTestsText(std::span<const ParameterTests> estimators) {
       has_alarm = true;
       text += AlarmText(test);
     }
-    if (!has_alarm) text += NoAlarmText(tests.parameters);
+    text += has_alarm ? "  change only the first of these parameters, and repeat the diagnosis\n"
+                      : NoAlarmText(tests.parameters);
+    for (const ParameterTest& test : tests.parameters) {
+      if (!test.not_tested.empty())
+        text += "  " + test.key + ": not tested, because " + test.not_tested + '\n';
+    }
   }
   return text;
 }

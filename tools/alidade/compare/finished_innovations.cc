@@ -28,9 +28,16 @@ InnovationSeries DescribedSeries(const std::string& sensor, const internal::Json
     series.z_index.push_back(
         std::isnan(number) ? -1 : static_cast<int>(index.Count(std::ssize(series.units) - 1)));
   }
+  for (const internal::JsonNode& is_angle : entry.At("is_angle").Items()) {
+    series.is_angle.push_back(is_angle.Flag() ? 1 : 0);
+  }
   series.dof = static_cast<int>(series.z_index.size());
   series.ambient = static_cast<int>(series.units.size());
   return series;
+}
+
+std::size_t ColumnOf(const NumberRows& rows, std::string_view name) {
+  return rows.ColumnOf(name, "an unmodified run folder; repeat the run");
 }
 
 /// Indices of the columns of innovations.csv. z, h, s and r are the indices of their first
@@ -38,26 +45,17 @@ InnovationSeries DescribedSeries(const std::string& sensor, const internal::Json
 struct InnovationColumns {
   explicit InnovationColumns(const NumberRows& rows)
       : count(rows.size()),
-        time(Find(rows, "t_s")),
-        sensor(Find(rows, "sensor")),
-        landmark(Find(rows, "landmark")),
-        outcome(Find(rows, "outcome")),
-        nis(Find(rows, "nis")),
-        z(Find(rows, "z0")),
-        h(Find(rows, "h0")),
-        s(Find(rows, "s0")),
-        r(Find(rows, "r0")) {}
+        time(ColumnOf(rows, "t_s")),
+        sensor(ColumnOf(rows, "sensor")),
+        landmark(ColumnOf(rows, "landmark")),
+        outcome(ColumnOf(rows, "outcome")),
+        nis(ColumnOf(rows, "nis")),
+        z(ColumnOf(rows, "z0")),
+        h(ColumnOf(rows, "h0")),
+        s(ColumnOf(rows, "s0")),
+        r(ColumnOf(rows, "r0")) {}
 
   std::size_t count, time, sensor, landmark, outcome, nis, z, h, s, r;
-
- private:
-  static std::size_t Find(const NumberRows& rows, std::string_view name) {
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      if (rows.text(i) == name) return i;
-    }
-    rows.FailLine("the column '" + std::string(name) + "' is missing",
-                  "an unmodified run folder; repeat the run");
-  }
 };
 
 std::vector<double> NumbersOf(const NumberRows& rows, std::size_t first, int count,
@@ -84,7 +82,11 @@ void AddRow(const NumberRows& rows, const InnovationColumns& columns, Innovation
   if (!rows.text(columns.landmark).empty()) {
     report.landmark = rows.Index(columns.landmark, "landmark");
   }
-  if (rows.text(columns.nis).empty()) return series.Add(timestamp, report);
+  // The numbers of other rows may be infinite or NaN.
+  const std::string_view nis = rows.text(columns.nis);
+  if (!InnovationSeries::Stores(report.outcome) || nis.empty() || nis == "inf") {
+    return series.Add(timestamp, report);
+  }
   const auto m = static_cast<std::size_t>(series.dof);
   const std::vector<double> z = NumbersOf(rows, columns.z, series.ambient, "z"),
                             h = NumbersOf(rows, columns.h, series.ambient, "h"),

@@ -99,7 +99,7 @@ Config WithVariant(const Config& config, const Variant& variant, const std::stri
                    const std::string& name, const std::string& filter) {
   Config extended = config.Copy();
   const std::string entry = "estimators." + name;
-  extended.Set(entry + ".type", type, kOrigin);
+  extended.Set(entry, "{type: " + type + '}', kOrigin);
   if (variant.full_information) extended.Set(entry + ".mode", "filtering", kOrigin);
   if (variant.accepted) extended.Set(entry + ".use.accepted_by", filter, kOrigin);
   for (const char* const key : variant.keys) {

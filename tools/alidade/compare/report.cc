@@ -188,29 +188,39 @@ std::vector<TableRow> AverageNeesRows(const std::vector<ComparedEstimator>& esti
   return rows;
 }
 
+/// Returns the verdict of a single run. For several runs, returns the number of runs with each
+/// verdict, as in `2 lost, 18 consistent`.
+std::string VerdictText(const ComparedEstimator& estimator, bool several) {
+  std::vector<std::string> parts;
+  for (const VerdictInfo& verdict : kVerdicts) {
+    const std::int64_t count = estimator.verdicts[static_cast<std::size_t>(verdict.state)];
+    if (count > 0) parts.push_back((several ? std::to_string(count) + ' ' : "") + verdict.name);
+  }
+  return internal::Join(parts);
+}
+
 /// Returns the section with the values over the run, either of the online estimators or of the
 /// smoothed estimators.
 Section AlongSection(const Comparison& comparison, bool smoothed, ReportRows rows) {
   std::vector<ComparedEstimator> estimators;
-  TableRow diverged{"diverged", {}}, used{"runs used", {}};
-  bool any_diverged = false;
+  const bool several = comparison.runs > 1;
+  TableRow verdict{"verdict", {}}, used{"runs used", {}};
   for (const ComparedEstimator& estimator : comparison.estimators) {
     if (estimator.smoothed != smoothed) continue;
     estimators.push_back(estimator);
-    diverged.cells.push_back(std::to_string(estimator.diverged));
+    verdict.cells.push_back(VerdictText(estimator, several));
     used.cells.push_back(std::to_string(estimator.used));
-    any_diverged = any_diverged || estimator.diverged > 0;
   }
   if (estimators.empty()) return {};
-  Section section = TableOf(estimators, comparison.runs > 1,
+  Section section = TableOf(estimators, several,
                             smoothed ? "Smoothed: estimates that also use later data"
                                      : "Online: estimates that use only past data",
                             &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
                             KindsOf(comparison, MetricSection::kAlong, rows));
   const std::vector<TableRow> average_nees = AverageNeesRows(estimators);
   section.rows.insert(section.rows.end(), average_nees.begin(), average_nees.end());
-  if (any_diverged) section.rows.push_back(diverged);
-  if (comparison.runs > 1) section.rows.push_back(used);
+  section.rows.push_back(verdict);
+  if (several) section.rows.push_back(used);
   return section;
 }
 
@@ -454,10 +464,15 @@ internal::Json JsonOf(const OverTime& over_time) {
 }
 
 internal::Json JsonOf(const ComparedEstimator& estimator, bool several) {
+  internal::Json verdicts = internal::Json::object();
+  for (const VerdictInfo& verdict : kVerdicts) {
+    verdicts[verdict.name] = estimator.verdicts[static_cast<std::size_t>(verdict.state)];
+  }
   internal::Json json = {{"type", estimator.type},
                          {"smoothed", estimator.smoothed},
                          {"reference", estimator.reference},
                          {"final_reference", estimator.final_reference},
+                         {"verdicts", verdicts},
                          {"diverged", estimator.diverged},
                          {"used", estimator.used},
                          {"reference_runs", estimator.reference_runs},

@@ -68,6 +68,7 @@ void AddName(const std::string& name, std::vector<std::string>& names) {
 ComparedEstimator SummariseEstimator(const std::vector<Comparison>& comparisons, std::size_t e) {
   ComparedEstimator summary = comparisons.front().estimators.at(e);
   summary.used = summary.diverged = summary.reference_runs = summary.final_reference_runs = 0;
+  summary.verdicts = {};
   std::vector<std::string> references, final_references;
   ValueCollector values;
   RatioCollector ratios;
@@ -75,6 +76,9 @@ ComparedEstimator SummariseEstimator(const std::vector<Comparison>& comparisons,
   for (const Comparison& comparison : comparisons) {
     const ComparedEstimator& estimator = comparison.estimators.at(e);
     summary.diverged += estimator.diverged;
+    for (std::size_t v = 0; v < summary.verdicts.size(); ++v) {
+      summary.verdicts[v] += estimator.verdicts[v];
+    }
     if (estimator.diverged > 0) continue;
     summary.used += 1;
     summary.reference_runs += estimator.reference_runs;

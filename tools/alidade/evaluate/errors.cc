@@ -3,16 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <numbers>
 
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
+#include "alidade/base/statistics.h"
 #include "alidade/evaluate/evaluate.h"
 
 namespace alidade {
 namespace {
 
-constexpr double kHalfTurn = 3.14159265358979323846;
+constexpr double kHalfTurn = std::numbers::pi;
 
 double AngleOf(const Eigen::Quaterniond& q) {
   return 2.0 * std::atan2(q.vec().norm(), std::abs(q.w()));
@@ -103,7 +104,7 @@ Pairs AllPairs(const std::vector<double>& progress, double delta, double toleran
         (nearest != first && deviation(nearest - 1) <= deviation(nearest))) {
       --nearest;
     }
-    if (nearest < first || deviation(nearest) > tolerance) continue;
+    if (deviation(nearest) > tolerance) continue;
     pairs.emplace_back(static_cast<int>(i), static_cast<int>(nearest - progress.begin()));
   }
   return pairs;
@@ -155,14 +156,10 @@ ErrorStatistics StatisticsOf(std::vector<double> errors) {
   s.min = errors.front();
   s.max = errors.back();
   s.median = 0.5 * (errors[(errors.size() - 1) / 2] + errors[errors.size() / 2]);
-  s.mean = std::accumulate(errors.begin(), errors.end(), 0.0) / n;
-  double spread = 0.0;
-  for (const double e : errors) {
-    s.sse += e * e;
-    spread += (e - s.mean) * (e - s.mean);
-  }
+  s.mean = Mean(errors);
+  for (const double e : errors) s.sse += e * e;
   s.rmse = std::sqrt(s.sse / n);
-  s.std = std::sqrt(spread / n);
+  s.std = std::sqrt(SquaredDeviation(errors) / n);
   return s;
 }
 

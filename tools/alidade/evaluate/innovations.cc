@@ -27,14 +27,6 @@ struct Columns {
   std::size_t sensor, landmark, outcome, dof, nis, s0, r0;
 };
 
-std::size_t Find(const NumberRows& rows, std::string_view name) {
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (rows.text(i) == name) return i;
-  }
-  rows.FailLine("the column '" + std::string(name) + "' is missing",
-                "innovations.csv of a run folder");
-}
-
 void AddProducts(const std::string& landmark, const std::vector<double>& r, SensorSums& sums) {
   std::vector<double>& last = sums.last[landmark];
   for (std::size_t k = 0; k < last.size() && k < r.size(); ++k) {
@@ -85,9 +77,11 @@ std::vector<InnovationStatistics> ReadInnovations(const std::filesystem::path& f
   NumberRows rows(file, {}, {});
   if (!rows.Next()) rows.FailLine("the header line is missing", "innovations.csv of a run folder");
   const std::size_t width = rows.size();
-  const Columns columns{Find(rows, "sensor"), Find(rows, "landmark"), Find(rows, "outcome"),
-                        Find(rows, "dof"),    Find(rows, "nis"),      Find(rows, "s0"),
-                        Find(rows, "r0")};
+  const auto column = [&rows](const char* name) {
+    return rows.ColumnOf(name, "innovations.csv of a run folder");
+  };
+  const Columns columns{column("sensor"), column("landmark"), column("outcome"), column("dof"),
+                        column("nis"),    column("s0"),       column("r0")};
   std::map<std::string, SensorSums> sensors;
   std::map<std::int64_t, double> limits;  // chi2(0.95, dof)
   while (rows.Next()) {

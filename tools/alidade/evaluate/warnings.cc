@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <numbers>
 #include <optional>
+#include <utility>
 
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
@@ -28,10 +30,11 @@ constexpr double kMinLength = 0.5;        ///< minimum of matched length / refer
 constexpr double kMaxErrorRatio = 10.0;   ///< maximum of error without / error with alignment
 constexpr double kMinBodyTurnDeg = 10.0;  ///< a larger common turn is not an estimation error
 constexpr double kMaxRemainder = 0.25;    ///< maximum of error after / before a correction
+constexpr double kMinMirrorError = 0.01;  ///< minimum error of a reflection / extent
 constexpr double kMinExplained = 0.5;     ///< minimum share of the variance that sim3 explains
 constexpr const char* kTimesOfFrames = "the time of each frame, from the list of its images";
 constexpr const char* kEurocTruth = "state_groundtruth_estimate0";
-constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 double Rmse(const Trajectory& reference, const Trajectory& estimate) {
   return internal::AbsoluteErrors(PoseRelation::kTranslation, reference, estimate).statistics.rmse;
@@ -96,6 +99,18 @@ bool AreCorrelated(const Eigen::Matrix3Xd& reference, const Eigen::Matrix3Xd& es
                      kMinExplained * internal::SquaredExtent(reference);
 }
 
+/// Returns the unit of positions whose size in m is the scale, to 2 %. Returns nullptr if the scale
+/// is that of no usual unit.
+const char* UnitOfScale(double scale) {
+  constexpr double kTolerance = 0.02;
+  constexpr std::pair<double, const char*> kUnits[] = {
+      {1e-3, "mm"}, {1e-2, "cm"}, {0.3048, "feet"}, {1e3, "km"}};
+  for (const auto& [size_m, unit] : kUnits) {
+    if (std::abs(std::log(scale / size_m)) < kTolerance) return unit;
+  }
+  return nullptr;
+}
+
 /// Returns the subject of a sentence: the quantities that positions determine in an alignment.
 std::string UndeterminedText(Alignment alignment) {
   if (alignment == Alignment::kScale) return "the scale is";
@@ -149,6 +164,7 @@ class WarningCollector {
     if (!AreCorrelated(reference.positions, evaluation_.estimate.positions)) return warnings_;
     const Similarity sim3 = Align(Alignment::kSim3, reference, evaluation_.estimate);
     CheckScale(sim3);
+    CheckReflection(sim3);
     CheckWorld();
     const bool planar =
         SpansAPlane(reference.positions) && SpansAPlane(evaluation_.estimate.positions);
@@ -254,10 +270,31 @@ class WarningCollector {
     const double sim3_error = Rmse(evaluation_.reference, sim3 * evaluation_.estimate);
     const double se3_error = Rmse(evaluation_.reference, se3 * evaluation_.estimate);
     if (!(sim3_error < 0.5 * se3_error)) return;
+    const char* const unit = UnitOfScale(sim3.scale);
     Warn("the scale is " + RoundedText(sim3.scale, 4) + " (the error is " +
              RoundedText(sim3_error, 4) + " m with sim3 and " + RoundedText(se3_error, 4) +
-             " m with se3): the estimate probably has no metric scale",
-         "the option -as, which aligns with scale");
+             " m with se3): the estimate " +
+             (unit == nullptr ? "probably has no metric scale"
+                              : std::string("is probably in ") + unit),
+         unit == nullptr ? "the option -as, which aligns with scale"
+                         : "positions in m, or the option -as, which aligns with scale");
+  }
+
+  /// Detects an axis with the opposite direction, which no rotation corrects.
+  void CheckReflection(const Similarity& sim3) {
+    const Trajectory& reference = evaluation_.reference;
+    Trajectory mirrored = evaluation_.estimate;
+    mirrored.positions.row(0) *= -1.0;
+    const double original_error = Rmse(reference, sim3 * evaluation_.estimate);
+    const double mirrored_error =
+        Rmse(reference, Align(Alignment::kSim3, reference, mirrored) * mirrored);
+    const double extent = std::sqrt(internal::SquaredExtent(reference.positions));
+    if (!(original_error > kMinMirrorError * extent)) return;
+    if (!(mirrored_error < kMaxRemainder * original_error)) return;
+    Warn("the error with sim3 is " + RoundedText(mirrored_error, 4) +
+             " m if the estimate is mirrored, but " + RoundedText(original_error, 4) +
+             " m otherwise: an axis probably has the opposite direction",
+         "axes of a right-handed frame in both files");
   }
 
   void CheckWorld() {
@@ -288,20 +325,26 @@ class WarningCollector {
         BodyTurnOf(reference, sim3 * estimate.WithOtherQuaternionOrder());
     const BodyTurn reference_reordered =
         BodyTurnOf(reference.WithOtherQuaternionOrder(), sim3 * estimate);
-    const bool estimate_is_wrong = estimate_reordered.spread_deg <= reference_reordered.spread_deg;
+    // If the body turns about one axis only, both files may fit in the other order.
+    const bool estimate_is_wrong =
+        estimate_reordered.spread_deg * kMaxRemainder <= reference_reordered.spread_deg;
+    const bool is_ambiguous =
+        estimate_is_wrong && reference_reordered.spread_deg < kMaxRemainder * original.spread_deg;
     const double reordered_spread_deg =
         std::min(estimate_reordered.spread_deg, reference_reordered.spread_deg);
     if (original.spread_deg > kMinBodyTurnDeg &&
         reordered_spread_deg < kMaxRemainder * original.spread_deg) {
       const Trajectory& wrong = estimate_is_wrong ? whole_estimate_ : whole_reference_;
       const bool w_first = wrong.format == TrajectoryFormat::kEuroc;
+      const std::string other_file =
+          is_ambiguous ? "; the other order of " + whole_reference_.name + " fits as well" : "";
       warnings_.push_back(ErrorLine({wrong.name, wrong.first_line, 0}, {},
                                     "the orientations agree to " +
                                         internal::FixedText(reordered_spread_deg, 1) +
                                         " deg if quaternions are read with w " +
                                         (w_first ? "last, but only to " : "first, but only to ") +
                                         internal::FixedText(original.spread_deg, 1) +
-                                        " deg with w " + (w_first ? "first" : "last"),
+                                        " deg with w " + (w_first ? "first" : "last") + other_file,
                                     w_first ? "qw qx qy qz" : "qx qy qz qw"));
     } else if (original.turn_deg > kMinBodyTurnDeg &&
                original.spread_deg < kMaxRemainder * original.turn_deg) {

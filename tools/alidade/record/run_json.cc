@@ -21,10 +21,12 @@ Json JsonOf(const Verdict& verdict) {
 
 /// Describes the innovations of a sensor. An element of r without an element of z is null.
 Json JsonOf(const InnovationSeries& series) {
-  Json z_index = Json::array();
+  Json z_index = Json::array(), is_angles = Json::array();
   for (const int index : series.z_index) z_index.push_back(index < 0 ? Json() : Json(index));
+  for (const char is_angle : series.is_angle) is_angles.push_back(is_angle != 0);
   return {{"units", series.units},
           {"z_index", z_index},
+          {"is_angle", is_angles},
           {"robust_loss", series.has_robust_loss},
           {"landmark_prior", series.has_landmark_prior}};
 }

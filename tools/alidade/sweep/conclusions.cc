@@ -40,7 +40,7 @@ std::vector<OwnerNees> NeesOf(const SweepSummary& summary) {
     const double value = mean->second.mean;
     if (value == 0.0) continue;
     owners.push_back({owner, value, bounds,
-                      TestScale(value, dof->second.mean, static_cast<double>(summary.used))});
+                      TestScale(value, dof->second.mean, static_cast<double>(dof->second.count))});
   }
   return owners;
 }

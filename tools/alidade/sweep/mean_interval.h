@@ -11,8 +11,8 @@ namespace alidade::internal {
 ///
 ///   mean -+ t s / sqrt(n),   s^2 = sum (x_i - mean)^2 / (n - 1)
 ///
-/// t is the 97.5 % quantile of Student's distribution with n - 1 degrees of freedom, to 1 %. The
-/// bounds are NaN for n < 2.
+/// t is the 97.5 % quantile of Student's distribution with n - 1 degrees of freedom. The bounds
+/// are NaN for n < 2.
 Interval MeanInterval(const std::vector<double>& values);
 
 }  // namespace alidade::internal

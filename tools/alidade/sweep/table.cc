@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
@@ -27,24 +28,6 @@ std::string ReferenceText(const SweepResult& result) {
          " runs, in which the reference failed, diverged or had no estimates";
 }
 
-/// Returns the number of used runs, and a row for each verdict that occurred.
-std::vector<TableRow> VerdictRows(const std::vector<SweepSummary>& summaries) {
-  std::vector<TableRow> rows = {{"runs used", {}}};
-  for (const SweepSummary& summary : summaries) {
-    rows[0].cells.push_back(std::to_string(summary.used));
-  }
-  for (const VerdictInfo& verdict : kVerdicts) {
-    TableRow row{verdict.name, {}};
-    std::int64_t total = 0;
-    for (const SweepSummary& summary : summaries) {
-      row.cells.push_back(std::to_string(summary.CountOf(verdict.state)));
-      total += summary.CountOf(verdict.state);
-    }
-    if (total > 0) rows.push_back(std::move(row));
-  }
-  return rows;
-}
-
 constexpr const char* kMetricsTitle =
     "Mean over the used runs, 95 % interval of this mean, and quantiles over the used runs";
 
@@ -63,7 +46,9 @@ Table MetricTable(const std::vector<SweepSummary>& summaries) {
       const Interval& interval = summary.mean_intervals.at(key);
       const std::array<double, kStatistics> values = {spread.mean, interval.low, interval.high,
                                                       spread.p05,  spread.p50,   spread.p95};
-      for (std::size_t i = 0; i < kStatistics; ++i) column[i].metrics[key] = values[i];
+      for (std::size_t i = 0; i < kStatistics; ++i) {
+        if (!std::isnan(values[i])) column[i].metrics[key] = values[i];
+      }
     }
   }
   Table table{{"", "estimator", "mean", "95 % interval", "5 %", "median", "95 %"}, {}, 2};
@@ -72,7 +57,7 @@ Table MetricTable(const std::vector<SweepSummary>& summaries) {
     for (std::size_t e = 0; e < summaries.size(); ++e) {
       const std::string* const c = &source.cells[e * kStatistics];
       if (c[0] == "-") continue;
-      const bool has_interval = summaries[e].used > 1;
+      const bool has_interval = c[1] != "-";
       table.rows.push_back({std::exchange(label, ""), summaries[e].name, c[0],
                             has_interval ? '[' + c[1] + ", " + c[2] + ']' : "-", c[3], c[4], c[5]});
     }
@@ -103,13 +88,30 @@ std::int64_t CountWithheld(const SweepResult& result) {
   });
 }
 
+std::vector<TableRow> VerdictRows(const std::vector<SweepSummary>& summaries) {
+  std::vector<TableRow> rows = {{"runs used", {}}};
+  for (const SweepSummary& summary : summaries) {
+    rows[0].cells.push_back(std::to_string(summary.used));
+  }
+  for (const VerdictInfo& verdict : kVerdicts) {
+    TableRow row{verdict.name, {}};
+    std::int64_t total = 0;
+    for (const SweepSummary& summary : summaries) {
+      row.cells.push_back(std::to_string(summary.CountOf(verdict.state)));
+      total += summary.CountOf(verdict.state);
+    }
+    if (total > 0) rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
 std::map<std::string, Interval> NeesBounds(const SweepSummary& summary) {
   constexpr std::string_view kDof = "nees.dof:";
   std::map<std::string, Interval> bounds;
   for (const auto& [key, dof] : summary.metrics) {
-    if (!key.starts_with(kDof) || summary.used == 0) continue;
+    if (!key.starts_with(kDof) || dof.count == 0) continue;
     bounds["nees.mean:" + key.substr(kDof.size())] =
-        ConsistencyBounds(dof.mean, static_cast<double>(summary.used));
+        ConsistencyBounds(dof.mean, static_cast<double>(dof.count));
   }
   return bounds;
 }

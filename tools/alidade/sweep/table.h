@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "alidade/base/statistics.h"
+#include "alidade/experiment/metric_rows.h"
 #include "alidade/io/text_table.h"
 #include "alidade/report/conclusion.h"
 #include "alidade/sweep/sweep.h"
@@ -18,6 +19,10 @@ std::int64_t CountFinished(const SweepResult& result);
 
 /// Returns the number of finished runs without a reference for the errors.
 std::int64_t CountWithheld(const SweepResult& result);
+
+/// Returns a row `runs used`, and a row for each verdict that occurred, with the number of runs.
+/// The rows have a cell for each summary.
+std::vector<TableRow> VerdictRows(const std::vector<SweepSummary>& summaries);
 
 /// Returns the 95 % bounds of the mean NEES over all runs for each owner, by the key of the metric.
 /// Each run counts as one sample, so the bounds are valid for any correlation of the errors over

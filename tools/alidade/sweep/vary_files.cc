@@ -48,20 +48,19 @@ struct ValueTable {
 
 ValueTable TableOf(const VariedSweep& sweep, const Column& column) {
   ValueTable table;
-  for (const SweepResult& result : sweep.results) {
-    const std::size_t v = table.rows.size();
+  for (std::size_t v = 0; v < sweep.results.size(); ++v) {
     table.rows.push_back({sweep.variation.values[v], {}});
-    const std::string of_all = " of " + std::to_string(CountFinished(result));
-    table.rows[v].cells = {std::to_string(column[v].diverged) + of_all,
-                           std::to_string(column[v].CountOf(VerdictState::kLost)) + of_all};
   }
-  table.header = {"diverged", "lost"};
-  for (const TableRow& metric : MetricRows(AsComparison(column))) {
-    table.header.push_back(metric.label);
-    for (std::size_t v = 0; v < table.rows.size(); ++v) {
-      table.rows[v].cells.push_back(metric.cells[v]);
+  const auto add_columns = [&](const std::vector<TableRow>& columns) {
+    for (const TableRow& source : columns) {
+      table.header.push_back(source.label);
+      for (std::size_t v = 0; v < table.rows.size(); ++v) {
+        table.rows[v].cells.push_back(source.cells[v]);
+      }
     }
-  }
+  };
+  add_columns(VerdictRows(column));
+  add_columns(MetricRows(AsComparison(column)));
   return table;
 }
 

@@ -23,7 +23,7 @@ struct WorstSeeds {
 std::vector<WorstSeeds> FindWorstSeeds(const SweepResult& result);
 
 /// Returns an empty line, and a line for each estimator, as in `worst seeds of ekf by rmse
-/// target.depth: 36 (7.7 m), 96 (3.1 m), 60 (2.9 m)`. Returns "" if there is no estimator.
+/// target.depth: 36 (7.7 m), 96 (3.1 m), 60 (2.9 m)`. Returns "" for an empty list.
 std::string WorstSeedLines(const std::vector<WorstSeeds>& worst);
 
 }  // namespace alidade::internal

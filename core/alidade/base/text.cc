@@ -26,7 +26,8 @@ std::string LowerCase(std::string_view text) {
 
 std::string ShellWord(const std::string& text) {
   constexpr const char* kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-=";
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+      "%+,-./:=@_";
   if (!text.empty() && text.find_first_not_of(kPlain) == text.npos) return text;
   std::string word = "'";
   for (const char c : text) c == '\'' ? word += "'\\''" : word += c;

@@ -20,8 +20,8 @@ void Print(std::string_view text);
 
 /// Writes a page to a file. Errors: kCannotCreate, kIo.
 void WritePageFile(const std::filesystem::path& file, std::string_view page);
-/// Returns an empty line and the line `report   PAGE`, the last line of a command that has written a
-/// page. PAGE is `path`, or `report.html` in it if `path` is a folder.
+/// Returns an empty line and the line `report   PAGE`, the last line of a command that has written
+/// a page. PAGE is `path`, or `report.html` in it if `path` is a folder.
 std::string ReportLine(std::filesystem::path path);
 
 /// Prints `error: LINE` on standard error for each line. An indented line continues the line above.

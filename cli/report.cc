@@ -16,8 +16,8 @@ constexpr const char* kReportFooter = R"(Examples:
   alidade report runs/sweep -o sweep.html
   alidade report orb.tum --reference truth.tum     write orb.html; errors without alignment
 
-The page is one file. It needs no network. If it exists, it is replaced. `alidade eval -o` writes the
-page of trajectories with an alignment.)";
+The page is one file. It needs no network. If it exists, it is replaced. `alidade eval -o` writes
+the page of trajectories with an alignment.)";
 
 struct ReportArguments {
   std::string path, reference, output;

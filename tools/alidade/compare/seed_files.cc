@@ -49,7 +49,7 @@ std::vector<TimeColumn> TimeColumnsOf(const ComparedEstimator& estimator) {
   return columns;
 }
 
-/// Writes over_time.csv: RMS and quantiles of the errors, average NEES and its bounds, by timestamp.
+/// Writes over_time.csv: RMS and quantiles of the errors, and average NEES with bounds, by time.
 void WriteOverTime(const OutputFolder& folder, const Estimators& estimators) {
   const std::vector<Timestamp> timestamps = TimestampsOf(estimators);
   if (timestamps.empty()) return;

@@ -35,8 +35,7 @@ class EstimateHistory {
 
   void Add(const SourceFrame& frame, const State& state);
   std::int64_t rows() const { return rows_; }
-  /// Returns the name of the position: the first vector of 2 or 3 elements `X.position`; "" if
-  /// there is none.
+  /// Returns the name of the position: the first vector of 2 or 3 elements `X.position`, or "".
   std::string position() const { return position_ ? blocks_[*position_].name : ""; }
   /// Returns the length of the path through the true positions; 0 if the truth is unknown.
   double path() const { return path_; }

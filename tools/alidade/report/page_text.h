@@ -9,7 +9,7 @@
 
 namespace alidade::internal {
 
-/// Returns a page with the facts and results `data` (docs/report.md), without the columns of `pool`.
+/// Returns the page with the facts and results `data` (docs/report.md) and the columns of `pool`.
 std::string PageText(const Json& data, const ColumnPool& pool);
 
 /// Writes `report.html` into an output folder, after all other files.

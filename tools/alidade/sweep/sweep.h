@@ -188,9 +188,9 @@ std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary
 std::string SweepTable(const VariedSweep& sweep);
 
 /// Output folder of a sweep (docs/cli.md). It contains sweep.json, runs.csv, table.md, report.html,
-/// config.resolved.yaml, and failures.csv if a run failed. A varied sweep adds sweep.csv. A shard adds finished_runs.jsonl, which MergeShards() reads. Until all runs are
-/// finished, the folder is `FOLDER.partial`, and its finished_runs.jsonl contains the runs that are
-/// finished.
+/// config.resolved.yaml, and failures.csv if a run failed. A varied sweep adds sweep.csv. A shard
+/// adds finished_runs.jsonl, which MergeShards() reads. Until all runs are finished, the folder is
+/// `FOLDER.partial`, and its finished_runs.jsonl contains the runs that are finished.
 class SweepFolder {
  public:
   struct Options {

@@ -65,8 +65,7 @@ Table MetricTable(const std::vector<SweepSummary>& summaries) {
   return table;
 }
 
-/// Formats the conclusions, the table of the verdicts, the table of the metrics, and the lines below
-/// the tables.
+/// Formats the conclusions, the tables of the verdicts and the metrics, and the lines below them.
 std::string FormatTables(const SweepResult& result, const std::vector<SweepSummary>& summaries,
                          TableFormat format) {
   const char* const title_end = format == TableFormat::kMarkdown ? ":\n\n" : ":\n";

@@ -29,6 +29,7 @@ class MeasurementLog {
  public:
   explicit MeasurementLog(const Problem& problem);
 
+  /// Adds the measurements of a frame.
   void Add(Timestamp timestamp, const UpdateReport& report);
 
   /// Use of the measurements of each sensor.

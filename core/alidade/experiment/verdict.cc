@@ -14,8 +14,8 @@ namespace {
 using internal::RoundedText;
 
 constexpr std::int64_t kMinSamples = 20;
-/// Probabilities p of TestScale for a mean NEES: without and with a finding about the innovations. A
-/// finding and a large NEES hardly ever occur together by chance.
+/// Probabilities p of TestScale for a mean NEES: without and with a finding about the innovations.
+/// A finding and a large NEES hardly ever occur together by chance.
 constexpr double kAlone = 8e-7, kBesideFinding = 5e-3;
 
 /// Returns the verdict `state` for the first event that satisfies `is_cause`.

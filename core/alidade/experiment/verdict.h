@@ -101,9 +101,9 @@ struct VerdictFacts {
 /// Computes the verdict. TestScale tests the mean of n values of NEES / dof, as the mean of
 /// n / (5 tau) independent values. tau is the autocorrelation time; the factor 5 allows for slow
 /// components that a short run hides. Values that are nearly constant count as one. With a finding
-/// about the innovations, the test is stricter. If the NEES passes, or without truth, findings about the size
-/// of the innovations determine the verdict. The reason is then the first finding, which usually
-/// explains the others.
+/// about the innovations, the test is stricter. If the NEES passes, or without truth, findings
+/// about the size of the innovations determine the verdict. The reason is then the first finding,
+/// which usually explains the others.
 Verdict ComputeVerdict(const VerdictFacts& facts);
 
 }  // namespace alidade

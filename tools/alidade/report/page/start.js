@@ -51,13 +51,14 @@ function verdictChips() {
 }
 
 function summarySection(main) {
-  const box = section('summary', 'What happened', '', main);
-  if (JUDGED.length) box.append(verdictChips());
   const results = COMPARISON || SWEEP || DATA.evaluation || DATA.bundle || {};
   const conclusions = conclusionItems(results.conclusions || []);
   const items = JUDGED.length
     ? [...conclusions, ...story(), ...conclusionItems(RUN.conclusions)]
     : conclusions;
+  if (!items.length && !JUDGED.length) return null;
+  const box = section('summary', 'What happened', '', main);
+  if (JUDGED.length) box.append(verdictChips());
   if (items.length) box.append(element('div', {class: 'panel'}, storyList(items)));
   return box;
 }

@@ -183,9 +183,9 @@ bool AddSensorRows(const SensorBinding& sensor, const double* known, const Probl
   }
   std::vector<double*> data;
   std::vector<int> strides;
-  for (RowMajor& block : j) {
-    data.push_back(block.data());
-    strides.push_back(static_cast<int>(block.cols()));
+  for (std::size_t i = 0; i < j.size(); ++i) {
+    data.push_back(roles[i] == nullptr ? nullptr : j[i].data());
+    strides.push_back(static_cast<int>(j[i].cols()));
   }
   std::vector<double> z(static_cast<std::size_t>(sensor.model->measurement().geometry.ambient));
   if (sensor.model->Linearise(roles.data(), z.data(), data.data(), strides.data(), known) !=

@@ -78,10 +78,10 @@ void AddRejectionEvents(const std::vector<SensorUse>& sensors, EstimatorResult& 
 /// Adds an event `no_measurement` if the estimator used no measurement for a long time, or else for
 /// each sensor that has no measurement at the end of the run.
 void AddGapEvents(const MeasurementLog& log, EstimatorResult& result) {
-  const auto add = [&](const MeasurementLog::Gap& gap, const std::string& what) {
+  const auto add = [&](const MeasurementLog::Gap& gap, const std::string& subject) {
     result.events.push_back(
         {gap.start, EventKind::kNoMeasurement,
-         what + " for " + SecondsText(gap.end - gap.start) + ", until " + SecondsText(gap.end)});
+         subject + " for " + SecondsText(gap.end - gap.start) + ", until " + SecondsText(gap.end)});
   };
   if (const auto gap = log.longest_gap()) return add(*gap, "no measurement was used");
   for (std::size_t i = 0; i < log.uses().size(); ++i) {

@@ -52,7 +52,7 @@ struct ParameterTestOptions {
 /// processes the data of the config. Then it processes the measurements that it accepted, once
 /// with the numbers of the config, and twice for each parameter: with a slightly smaller and a
 /// slightly larger number. In these runs, each measurement is an update of its own, so that the
-/// innovations are independent, and there is no gate. The innovations of a sensor with a robust
+/// innovations are independent; the gate is off. The innovations of a sensor with a robust
 /// loss are not used. Only the first kMaxTestedMeasurements measurements are used.
 ///
 /// The tested quantity of a standard deviation is log sigma. `better` is sqrt(1 + 2 d) sigma, with

@@ -49,6 +49,34 @@ TEST(UnobservableDirections, AreUnknownIfASensorIsNotDefinedAtThePrior) {
   EXPECT_TRUE(UnobservableDirections(problem).empty());
 }
 
+/// Measures a position, with a lever arm if the role is bound.
+struct WithLeverArm : Sensor<Vec<3>, Vec<3>, Vec<3>> {
+  static constexpr std::array kRoles{Quantity{"position"},
+                                     Quantity{"lever_arm", "", "", "", ALIDADE_ROLE_OPTIONAL}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* position, const T* lever_arm, T* z) const {
+    for (int i = 0; i < 3; ++i) z[i] = position[i] + (lever_arm == nullptr ? T(0.0) : lever_arm[i]);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    for (int i = 0; i < 3; ++i) l[4 * i] = T(0.1);
+  }
+};
+
+// The model writes a Jacobian with three columns for each role that has a destination.
+TEST(UnobservableDirections, DoNotNeedTheJacobianOfAnUnboundRole) {
+  Problem problem;
+  MotionBinding binding{"p", testing::ConstantMotion(3), {}};
+  binding.blocks.push_back(problem.layout.Declare("p.x", "p", binding.model->blocks()[0]));
+  problem.priors.push_back({0, {1.0, 2.0, 3.0}, Eigen::Matrix3d::Identity(), ""});
+  problem.motions.push_back(binding);
+  testing::AddSensor(problem, "s", MakeSensor(WithLeverArm{}, "with_lever_arm"), {"p.x"});
+  problem.sensors[0].roles.push_back({});
+  EXPECT_TRUE(UnobservableDirections(problem).empty());
+}
+
 TEST(UnobservableDirections, WhereNothingMeasuresNothingIsSeen) {
   Problem problem = testing::DepthFilter();
   problem.sensors.clear();

@@ -65,7 +65,7 @@ class DrivenTest : public HostTest {
   }
   RunResult RunInto(const Config& config, const fs::path& folder) {
     Experiment experiment = BuildExperiment(config, host_);
-    Recorder recorder({folder, false, false, "alidade run"}, config);
+    Recorder recorder(testing::OptionsFor(folder), config);
     RunResult result = testing::RunInto(recorder, experiment);
     recorder.Finish(result);
     return result;

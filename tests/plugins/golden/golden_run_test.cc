@@ -68,7 +68,7 @@ TEST_P(GoldenRun, GivesTheEstimatesOfItsDay) {
   const Config config = Config::FromFile(Kept() / "config.yaml");
   Experiment experiment = BuildExperiment(config, Host());
   const fs::path folder = folder_ / "run";
-  Recorder recorder({folder, false, false, "alidade run"}, config);
+  Recorder recorder(testing::OptionsFor(folder), config);
   const RunResult result = testing::RunInto(recorder, experiment);
   recorder.Finish(result);
   ASSERT_EQ(result.status, RunStatus::kOk) << result.reason;

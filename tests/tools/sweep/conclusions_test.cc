@@ -42,6 +42,7 @@ SweepSummary SummaryOf(const std::string& name, double nees, std::int64_t used =
   summary.used = used;
   summary.metrics["nees.mean:x"].mean = nees;
   summary.metrics["nees.dof:x"].mean = 2.0;
+  summary.metrics["nees.dof:x"].count = used;
   return summary;
 }
 

@@ -6,53 +6,26 @@
 #include <cmath>
 #include <limits>
 
-#include "alidade/io/read_file.h"
 #include "alidade/io/run_files.h"
 #include "alidade/io/text_cell.h"
+#include "alidade/report/csv_rows.h"
 
 namespace alidade::internal {
 
-CsvColumns::CsvColumns(const std::filesystem::path& file) : file_(file) {
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) return;
-  RequireFile(file);
-  *text_ = ReadFile(file, [&](ExitCode, int) { FailFile(file, 0, "the file cannot be read"); });
-  Parse();
-}
-
-void CsvColumns::Fail(std::size_t row, const std::string& problem) const {
-  FailFile(file_, static_cast<int>(row) + 2, problem);
-}
-
-std::string_view CsvColumns::ParseCell(std::size_t& position) {
-  const std::string_view text = *text_;
-  const std::size_t begin = position;
-  if (position >= text.size() || text[position] != '"') {
-    position = std::min(text.find_first_of(",\n", position), text.size());
-    return text.substr(begin, position - begin);
-  }
-  std::string& cell = *unquoted_.emplace_back(std::make_unique<std::string>());
-  for (++position; position < text.size(); ++position) {
-    if (text[position] == '"' && (++position == text.size() || text[position] != '"')) break;
-    cell += text[position];
-  }
-  return cell;
-}
-
-void CsvColumns::Parse() {
-  std::vector<std::string_view> row;
-  for (std::size_t position = 0; position < text_->size();) {
-    row.push_back(ParseCell(position));
-    if (position >= text_->size()) break;  // the last row is incomplete
-    if ((*text_)[position++] == ',') continue;
-    if (names_.empty()) {
-      names_ = row;
-    } else if (row.size() == names_.size()) {
-      cells_.insert(cells_.end(), row.begin(), row.end());
-    } else {
-      Fail(rows(), "the number of cells differs from that of the header");
+CsvColumns::CsvColumns(const std::filesystem::path& file, const RowSelection& selection)
+    : file_(file) {
+  CsvRows table(file);
+  names_ = table.names();
+  for (std::size_t next = 0; table.Next(); ++total_rows_) {
+    if (selection) {
+      if (next == selection->size() || (*selection)[next] != table.row()) continue;
+      ++next;
     }
-    row.clear();
+    lines_.push_back(static_cast<std::uint32_t>(table.row()));
+    for (const std::string_view cell : table.cells()) {
+      text_ += cell;
+      ends_.push_back(text_.size());
+    }
   }
 }
 
@@ -66,7 +39,10 @@ std::vector<std::string_view> CsvColumns::Texts(std::string_view name) const {
   const auto column = Find(name);
   std::vector<std::string_view> texts;
   if (!column) return texts;
-  for (std::size_t i = *column; i < cells_.size(); i += width()) texts.push_back(cells_[i]);
+  for (std::size_t i = *column; i < ends_.size(); i += names_.size()) {
+    const std::size_t begin = i == 0 ? 0 : ends_[i - 1];
+    texts.push_back(std::string_view(text_).substr(begin, ends_[i] - begin));
+  }
   return texts;
 }
 
@@ -78,8 +54,9 @@ std::vector<double> CsvColumns::Numbers(std::string_view name) const {
     const char* const last = text.data() + text.size();
     const auto [end, error] = std::from_chars(text.data(), last, number);
     if (!text.empty() && (error != std::errc() || end != last)) {
-      Fail(numbers.size() - 1, "the column '" + std::string(name) + "' contains '" +
-                                   cell::PrintableStart(text) + "', which is not a number");
+      FailFile(file_, static_cast<int>(lines_[numbers.size() - 1]) + 2,
+               "the column '" + std::string(name) + "' contains '" + cell::PrintableStart(text) +
+                   "', which is not a number");
     }
   }
   numbers.resize(rows(), kNan);
@@ -87,13 +64,9 @@ std::vector<double> CsvColumns::Numbers(std::string_view name) const {
 }
 
 std::vector<Timestamp> CsvColumns::Times(std::string_view name) const {
+  static_cast<void>(Numbers(name));  // rejects a cell that is not a number
   std::vector<Timestamp> times;
-  const std::vector<double> numbers = Numbers(name);
-  for (const std::string_view text : Texts(name)) {
-    const double seconds = numbers[times.size()];
-    const bool is_known = std::abs(seconds) < cell::kTimeLimit;
-    times.push_back(is_known ? cell::ParseTimestamp(text, seconds, 9) : kNoTimestamp);
-  }
+  for (const std::string_view text : Texts(name)) times.push_back(TimeOf(text));
   return times;
 }
 

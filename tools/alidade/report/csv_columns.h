@@ -1,28 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "alidade/base/timestamp.h"
+#include "alidade/report/row_selection.h"
 
 namespace alidade::internal {
 
-/// CSV file of a run folder, read as a whole. Cells are identified by the name of their column and
-/// the index of their row. A last row without a line end is omitted: the run was interrupted while
-/// it was written.
+/// Selected rows of a CSV file of a run folder. Cells are identified by the name of their column and
+/// the index of their row.
 class CsvColumns {
  public:
   /// Reads `file`. The result has no columns if the file does not exist. Errors: kBadData with file
   /// and line, kIo.
-  explicit CsvColumns(const std::filesystem::path& file);
+  explicit CsvColumns(const std::filesystem::path& file, const RowSelection& selection = {});
+  CsvColumns(const CsvColumns&) = delete;
+  CsvColumns& operator=(const CsvColumns&) = delete;
 
-  std::size_t rows() const { return width() == 0 ? 0 : cells_.size() / width(); }
-  const std::vector<std::string_view>& names() const { return names_; }
+  std::size_t rows() const { return lines_.size(); }
+  /// Returns the number of rows of the file.
+  std::size_t total_rows() const { return total_rows_; }
+  const std::vector<std::string>& names() const { return names_; }
   bool Has(std::string_view name) const { return Find(name).has_value(); }
 
   /// Returns the texts of a column; empty if the column is missing.
@@ -34,17 +38,14 @@ class CsvColumns {
   std::vector<Timestamp> Times(std::string_view name = "t_s") const;
 
  private:
-  std::size_t width() const { return names_.size(); }
   std::optional<std::size_t> Find(std::string_view name) const;
-  void Parse();
-  /// Parses the cell that starts at `position`, and moves `position` to the separator behind it.
-  std::string_view ParseCell(std::size_t& position);
-  [[noreturn]] void Fail(std::size_t row, const std::string& problem) const;
 
   std::filesystem::path file_;
-  std::unique_ptr<std::string> text_ = std::make_unique<std::string>();  ///< text of the file
-  std::vector<std::unique_ptr<std::string>> unquoted_;  ///< contents of quoted cells
-  std::vector<std::string_view> names_, cells_;         ///< the header, and all cells row by row
+  std::vector<std::string> names_;
+  std::vector<std::uint32_t> lines_;  ///< index of each selected row in the file
+  std::string text_;                  ///< texts of all cells, row by row
+  std::vector<std::size_t> ends_;     ///< end of each cell in `text_`
+  std::size_t total_rows_ = 0;
 };
 
 /// Returns the elements of `values` at `indices`.

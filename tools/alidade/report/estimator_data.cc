@@ -68,7 +68,7 @@ Json BlockData(const EstimatorTables& tables, const Json& block, const Json& col
   for (const std::string& column : values.names) {
     value.push_back(pool.AddNumbers(tables.estimates.Numbers(column)));
   }
-  const bool has_errors = tables.errors.rows() == tables.estimates.rows();
+  const bool has_errors = tables.errors.total_rows() == tables.estimates.total_rows();
   return {{"name", name},
           {"unit", block.at("unit")},
           {"geometry", block.at("geometry")},
@@ -84,7 +84,7 @@ Json BlockData(const EstimatorTables& tables, const Json& block, const Json& col
 Json NeesData(const EstimatorTables& tables, ColumnPool& pool) {
   const std::string_view prefix = "nees:";
   Json list = Json::array();
-  if (tables.errors.rows() != tables.estimates.rows()) return list;
+  if (tables.errors.total_rows() != tables.estimates.total_rows()) return list;
   for (const std::string_view name : tables.errors.names()) {
     if (!name.starts_with(prefix)) continue;
     const std::string owner(name.substr(prefix.size()));

@@ -102,15 +102,6 @@ Json SensorData(const std::string& name, const Json& description, const SensorRo
   return data;
 }
 
-/// Returns at most 5000 of the rows, equally spaced.
-std::vector<std::uint32_t> Thinned(const std::vector<std::uint32_t>& rows) {
-  constexpr std::size_t kMaxRows = 5000;
-  const std::size_t stride = rows.size() / kMaxRows + 1;
-  std::vector<std::uint32_t> thinned;
-  for (std::size_t i = 0; i < rows.size(); i += stride) thinned.push_back(rows[i]);
-  return thinned;
-}
-
 }  // namespace
 
 Json InnovationData(const EstimatorTables& tables, bool has_measurements, const RunTimes& times,
@@ -129,7 +120,7 @@ Json GainData(const EstimatorTables& tables, const RunTimes& times, ColumnPool& 
   constexpr std::size_t kMaxGains = 24;  // more would not be readable
   Json list = Json::array();
   for (const std::string& sensor : DistinctTexts(tables.gains, "sensor")) {
-    const std::vector<std::uint32_t> rows = Thinned(RowsWith(tables.gains, "sensor", sensor));
+    const std::vector<std::uint32_t> rows = RowsWith(tables.gains, "sensor", sensor);
     Json columns = Json::array();
     for (const std::string_view name : tables.gains.names()) {
       if (name.find("<-") == name.npos) continue;

@@ -114,7 +114,7 @@ void CommitWithPage(OutputFolder& folder) {
   std::exception_ptr error;
   try {
     WritePage(folder);
-  } catch (const Error&) {
+  } catch (...) {  // a write failed, or memory ran out
     error = std::current_exception();
     folder.Remove("report.html");
   }

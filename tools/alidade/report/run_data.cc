@@ -5,10 +5,10 @@
 #include <cmath>
 #include <deque>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "alidade/estimation/estimator.h"
 #include "alidade/io/run_files.h"
+#include "alidade/report/csv_rows.h"
 #include "alidade/report/estimator_data.h"
 #include "alidade/report/run_tables.h"
 
@@ -44,9 +44,9 @@ Json GateOf(const Node& config, const std::string& estimator) {
 Json TruthData(const CsvColumns& truth, const RunTimes& times, ColumnPool& pool) {
   Json data = Json::object();
   const std::vector<Timestamp> timestamps = truth.Times();
-  for (const std::string_view name : truth.names()) {
+  for (const std::string& name : truth.names()) {
     if (name == "t_s") continue;
-    data[std::string(name)] = pool.AddNumbers(times.Align(timestamps, truth.Numbers(name)));
+    data[name] = pool.AddNumbers(times.Align(timestamps, truth.Numbers(name)));
   }
   return data;
 }
@@ -75,31 +75,32 @@ Json ImpliedData(const CsvColumns& implied, const RunTimes& times, ColumnPool& p
   return list;
 }
 
-/// Returns the timestamps at which any estimator received a valid measurement of `sensor`.
-std::set<Timestamp> ValidTimes(const std::deque<EstimatorTables>& estimators,
-                               const std::string& sensor) {
-  std::set<Timestamp> valid;
+/// Returns for each timestamp whether any estimator received a valid measurement of `sensor`.
+std::vector<bool> HasValid(const std::deque<EstimatorTables>& estimators, const std::string& sensor,
+                           const RunTimes& times) {
+  std::vector<bool> has_valid(times.all().size());
   for (const EstimatorTables& estimator : estimators) {
-    const CsvColumns& table = estimator.innovations;
-    const std::vector<Timestamp> timestamps = table.Times();
-    const std::vector<std::string_view> outcomes = table.Texts("outcome");
-    for (const std::uint32_t row : RowsWith(table, "sensor", sensor)) {
-      const bool is_invalid = outcomes[row] == ToString(Outcome::kInvalid) ||
-                              outcomes[row] == ToString(Outcome::kNotFinite);
-      if (!is_invalid) valid.insert(timestamps[row]);
+    CsvRows table(estimator.innovations_file);
+    const auto name = table.Find("sensor"), outcome = table.Find("outcome"), t = table.Find("t_s");
+    while (name && outcome && t && table.Next()) {
+      const std::vector<std::string_view>& cells = table.cells();
+      const bool is_invalid = cells[*outcome] == ToString(Outcome::kInvalid) ||
+                              cells[*outcome] == ToString(Outcome::kNotFinite);
+      if (cells[*name] != sensor || is_invalid) continue;
+      if (const auto index = times.Find(cells[*t])) has_valid[*index] = true;
     }
   }
-  return valid;
+  return has_valid;
 }
 
 /// Returns the intervals that contain all timestamps of a segment and no other. An interval ends
 /// at the next timestamp.
-Json SpansOf(const RunTimes& times, const std::set<Timestamp>& valid, bool with_measurement) {
+Json SpansOf(const RunTimes& times, const std::vector<bool>& has_valid, bool with_measurement) {
   Json spans = Json::array();
   bool is_open = false;
-  for (const Timestamp time : times.all()) {
-    const bool is_inside = valid.contains(time) == with_measurement;
-    const double seconds = times.SecondsOf(time);
+  for (std::size_t i = 0; i < has_valid.size(); ++i) {
+    const bool is_inside = has_valid[i] == with_measurement;
+    const double seconds = times.SecondsOf(times.all()[i]);
     if (is_inside && !is_open) spans.push_back({seconds, seconds});
     if (is_open) spans.back()[1] = seconds;
     is_open = is_inside;
@@ -117,9 +118,10 @@ Json SegmentData(const Node& config, const std::deque<EstimatorTables>& estimato
     const bool needs_measurement = rule.Find("with").has_value();
     const char* const key = needs_measurement ? "with" : "without";
     const std::string sensor = rule.At(key).Text();
+    const std::vector<bool> has_valid = HasValid(estimators, sensor, times);
     list.push_back({{"name", name},
                     {"rule", key + (' ' + sensor)},
-                    {"spans", SpansOf(times, ValidTimes(estimators, sensor), needs_measurement)}});
+                    {"spans", SpansOf(times, has_valid, needs_measurement)}});
   }
   return list;
 }
@@ -129,8 +131,7 @@ Json SegmentData(const Node& config, const std::deque<EstimatorTables>& estimato
 Json RunData(const fs::path& folder, const Json& run, const Node& config, ColumnPool& pool) {
   if (!run.contains("estimators")) return {};
   std::deque<EstimatorTables> estimators;
-  const CsvColumns truth(folder / "truth.csv");
-  std::vector<Timestamp> timestamps = truth.Times();
+  std::vector<Timestamp> timestamps;
   for (const auto& [name, entry] : run.at("estimators").items()) {
     if (!entry.contains("blocks")) continue;  // the run ended before the files were created
     const EstimatorTables& tables = estimators.emplace_back(folder, name, entry);
@@ -139,16 +140,23 @@ Json RunData(const fs::path& folder, const Json& run, const Node& config, Column
       timestamps.insert(timestamps.end(), more.begin(), more.end());
     }
   }
-  if (timestamps.empty() || estimators.empty()) return {};
+  if (estimators.empty()) return {};
+  std::ranges::sort(timestamps);
+  const CsvColumns truth(folder / "truth.csv", SelectTimes(folder / "truth.csv", timestamps));
+  const std::vector<Timestamp> truth_times = truth.Times();
+  timestamps.insert(timestamps.end(), truth_times.begin(), truth_times.end());
+  if (timestamps.empty()) return {};
   const RunTimes times(std::move(timestamps), pool);
   const Json columns = ReadJsonFile(folder / "columns.json");
+  const fs::path implied_file = folder / "implied_states.csv";
+  const CsvColumns implied(implied_file, SelectRows(implied_file, {"sensor"}, ""));
   // The page of an incomplete run shows the measurements of the last frames.
   const bool is_complete = run.value("status", "ok") == "ok";
   Json data = {{"t", times.column()},
                {"t0", Seconds(times.origin())},
                {"outcomes", OutcomeList()},
                {"truth", TruthData(truth, times, pool)},
-               {"implied", ImpliedData(CsvColumns(folder / "implied_states.csv"), times, pool)},
+               {"implied", ImpliedData(implied, times, pool)},
                {"segments", SegmentData(config, estimators, times)},
                {"conclusions", run.value("conclusions", Json::array())}};
   Json& list = data["estimators"] = Json::array();

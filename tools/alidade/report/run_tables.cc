@@ -5,17 +5,33 @@
 #include <limits>
 #include <set>
 
+#include "alidade/report/csv_rows.h"
+#include "alidade/report/row_selection.h"
+
 namespace alidade::internal {
+namespace {
+
+constexpr std::size_t kMaxGainRows = 5000;
+
+/// Selects the rows of estimates.csv and errors.csv, which have the same times.
+RowSelection EstimateRows(const std::filesystem::path& folder) {
+  const bool has_errors = std::filesystem::exists(folder / "errors.csv");
+  return SelectRows(folder / (has_errors ? "errors.csv" : "estimates.csv"), {}, "nees:");
+}
+
+}  // namespace
 
 EstimatorTables::EstimatorTables(const std::filesystem::path& folder, const std::string& estimator,
                                  const Json& run_entry)
     : name(estimator),
       entry(run_entry),
       covariance_file(folder / name / "trajectory_covariance.tum"),
-      estimates(folder / name / "estimates.csv"),
-      errors(folder / name / "errors.csv"),
-      innovations(folder / name / "innovations.csv"),
-      gains(folder / name / "gains.csv"),
+      errors(folder / name / "errors.csv", EstimateRows(folder / name)),
+      estimates(folder / name / "estimates.csv", EstimateRows(folder / name)),
+      innovations_file(folder / name / "innovations.csv"),
+      innovations(innovations_file, SelectRows(innovations_file, {"sensor", "outcome"}, "nis")),
+      gains(folder / name / "gains.csv",
+            SelectRows(folder / name / "gains.csv", {"sensor"}, "", kMaxGainRows)),
       landmarks(folder / name / "landmarks.csv"),
       events(folder / name / "events.csv"),
       final_covariance(folder / name / "final_covariance.csv") {}
@@ -38,6 +54,13 @@ int RunTimes::ColumnOf(const std::vector<Timestamp>& times) const {
   indices.reserve(times.size());
   for (const Timestamp time : times) indices.push_back(IndexOf(time));
   return pool_.AddSelection(column_, indices);
+}
+
+std::optional<std::size_t> RunTimes::Find(std::string_view cell) const {
+  const Timestamp time = TimeOf(cell);
+  const auto found = std::ranges::lower_bound(all_, time);
+  if (found == all_.end() || *found != time) return std::nullopt;
+  return static_cast<std::size_t>(found - all_.begin());
 }
 
 double RunTimes::SecondsOf(Timestamp time) const {

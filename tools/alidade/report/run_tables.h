@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,7 +12,8 @@
 
 namespace alidade::internal {
 
-/// Files of one estimator in a run folder.
+/// Files of one estimator in a run folder. Of long files, only selected rows are read: each
+/// rejected measurement is a row of a group of its own, so that accepted ones do not displace it.
 struct EstimatorTables {
   EstimatorTables(const std::filesystem::path& folder, const std::string& estimator,
                   const Json& run_entry);
@@ -20,7 +21,9 @@ struct EstimatorTables {
   std::string name;
   const Json& entry;  ///< entry of the estimator in run.json
   std::filesystem::path covariance_file;
-  CsvColumns estimates, errors, innovations, gains, landmarks, events, final_covariance;
+  CsvColumns errors, estimates;
+  std::filesystem::path innovations_file;
+  CsvColumns innovations, gains, landmarks, events, final_covariance;
 };
 
 /// Timestamps of a run: the union of the timestamps of all its files, sorted. Stores the times of
@@ -36,6 +39,8 @@ class RunTimes {
   int column() const { return column_; }
   /// Returns the column of `times`, which are part of the union.
   int ColumnOf(const std::vector<Timestamp>& times) const;
+  /// Returns the place of the time in a cell. Returns nullopt if the run does not have this time.
+  std::optional<std::size_t> Find(std::string_view cell) const;
   /// Returns seconds after the origin; NaN for kNoTimestamp.
   double SecondsOf(Timestamp time) const;
   /// Returns the values at all timestamps, of a file whose rows have the timestamps `times`.

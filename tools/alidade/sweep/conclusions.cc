@@ -22,7 +22,8 @@ using Tone = Conclusion::Tone;
 struct OwnerNees {
   std::string owner;
   double mean;
-  Interval bounds;  ///< 95 % bounds of the mean
+  std::int64_t count;  ///< number of runs
+  Interval bounds;     ///< 95 % bounds of the mean
   ScaleTest test;
 
   bool is_inside() const { return mean >= bounds.low && mean <= bounds.high; }
@@ -32,15 +33,15 @@ struct OwnerNees {
 /// because its blocks are known exactly.
 std::vector<OwnerNees> NeesOf(const SweepSummary& summary) {
   std::vector<OwnerNees> owners;
-  if (summary.used < 2) return owners;
   for (const auto& [key, bounds] : NeesBounds(summary)) {
     const std::string owner = MetricKey::Parse(key).subject;
     const auto mean = summary.metrics.find(key), dof = summary.metrics.find("nees.dof:" + owner);
     if (mean == summary.metrics.end() || !std::isfinite(mean->second.mean)) continue;
     const double value = mean->second.mean;
-    if (value == 0.0) continue;
-    owners.push_back({owner, value, bounds,
-                      TestScale(value, dof->second.mean, static_cast<double>(dof->second.count))});
+    const std::int64_t count = dof->second.count;
+    if (value == 0.0 || count < 2) continue;
+    owners.push_back({owner, value, count, bounds,
+                      TestScale(value, dof->second.mean, static_cast<double>(count))});
   }
   return owners;
 }
@@ -163,7 +164,7 @@ std::vector<Conclusion> Inconsistencies(const SweepSummary& summary) {
     if (nees.is_inside()) continue;
     const bool is_large = nees.mean > nees.bounds.high;
     const std::string word = is_large ? "overconfident" : "underconfident";
-    const std::string start = summary.name + ": over " + std::to_string(summary.used) +
+    const std::string start = summary.name + ": over " + std::to_string(nees.count) +
                               " runs, the NEES of " + nees.owner + " is " +
                               RoundedText(nees.mean, 3) + ", and 1 is expected: ";
     if (nees.test == ScaleTest::kPassed) {

@@ -62,7 +62,9 @@ IndependentCount IndependentValues(const NeesSeries& series, double mean) {
   return {.count = count};
 }
 
-/// Returns the verdict of the NEES that is farthest from 1. TestScale has the probability p.
+/// Returns the verdict of the NEES that is farthest from 1. TestScale has the probability p. Errors
+/// that are all zero belong to a block that starts from the truth and is never corrected; they are
+/// not tested.
 Verdict FromNees(std::span<const NeesSeries> owners, double p) {
   Verdict verdict;
   verdict.state = VerdictState::kConsistent;
@@ -72,6 +74,7 @@ Verdict FromNees(std::span<const NeesSeries> owners, double p) {
   for (const NeesSeries& owner : owners) {
     if (std::ssize(owner.values) < kMinSamples) continue;
     const double mean = Mean(owner.values);
+    if (mean == 0.0) continue;
     const IndependentCount independent = IndependentValues(owner, mean);
     const ScaleTest test = TestScale(mean, owner.dof, independent.count, p);
     means +=
@@ -88,7 +91,8 @@ Verdict FromNees(std::span<const NeesSeries> owners, double p) {
   }
   if (means.empty()) {
     return {.because =
-                "there are fewer than " + std::to_string(kMinSamples) + " timestamps with truth"};
+                "there are fewer than " + std::to_string(kMinSamples) +
+                " timestamps with truth, or all errors are zero"};
   }
   if (verdict.state == VerdictState::kConsistent) {
     verdict.because = "NEES " + means + " (1 is expected)";

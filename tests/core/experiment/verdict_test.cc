@@ -38,6 +38,12 @@ TEST(Verdict, ComparesTheMeanNeesWithOne) {
   EXPECT_EQ(StateOf(1.2, 100'000), VerdictState::kConsistent);
 }
 
+TEST(Verdict, DoesNotTestErrorsThatAreExactlyZero) {
+  EXPECT_EQ(StateOf(0.0, 200), VerdictState::kNotTested);
+  const std::vector<NeesSeries> owners = {MakeNees(1.0, 200), MakeNees(0.0, 200)};
+  EXPECT_EQ(ComputeVerdict({.nees = owners}).state, VerdictState::kConsistent);
+}
+
 TEST(Verdict, StatesItsReasonAndItsBasis) {
   const NeesSeries nees = MakeNees(4.0, 200);
   const Verdict verdict = ComputeVerdict({.nees = {&nees, 1}});

@@ -16,8 +16,8 @@ const std::string kBench = ALIDADE_SOURCE_DIR "/bench/long_run/";
 
 class LongRun : public testing::ProgramTest {
  protected:
-  /// Returns the peak resident memory of a run of `config` in KiB, before it writes its results. With
-  /// the page, which contains a bounded number of rows, the peak must not exceed 100 MiB.
+  /// Returns the peak resident memory of a run of `config` in KiB, before it writes its results.
+  /// With the page, which contains a bounded number of rows, the peak must not exceed 100 MiB.
   long PeakOf(const std::string& config, testing::Arguments settings) {
     testing::Arguments arguments = {"run", config, "--force", "-o", "out"};
     for (std::string& setting : settings) {
@@ -110,8 +110,8 @@ TEST_F(LongRun, APipeIsTakenAsItGrows) {
     ASSERT_EQ(::write(pipe, rows.data(), rows.size()), static_cast<ssize_t>(rows.size()));
   };
   feed(0);
-  const pid_t run = Start({"run", kBench + "stream.yaml", "--follow", "-o", "out",
-                           "--set", "source.path=" + (folder_ / "pipe").string()});
+  const pid_t run = Start({"run", kBench + "stream.yaml", "--follow", "-o", "out", "--set",
+                           "source.path=" + (folder_ / "pipe").string()});
   constexpr int kFrames = 30;
   for (int k = 1; k <= kFrames; ++k) {
     feed(k);

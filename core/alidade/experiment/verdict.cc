@@ -90,9 +90,8 @@ Verdict FromNees(std::span<const NeesSeries> owners, double p) {
                       " than P indicates";
   }
   if (means.empty()) {
-    return {.because =
-                "there are fewer than " + std::to_string(kMinSamples) +
-                " timestamps with truth, or all errors are zero"};
+    return {.because = "there are fewer than " + std::to_string(kMinSamples) +
+                       " timestamps with truth, or all errors are zero"};
   }
   if (verdict.state == VerdictState::kConsistent) {
     verdict.because = "NEES " + means + " (1 is expected)";

@@ -13,8 +13,8 @@
 
 namespace alidade::internal {
 
-/// Selected rows of a CSV file of a run folder. Cells are identified by the name of their column and
-/// the index of their row.
+/// Selected rows of a CSV file of a run folder. Cells are identified by the name of their column
+/// and the index of their row.
 class CsvColumns {
  public:
   /// Reads `file`. The result has no columns if the file does not exist. Errors: kBadData with file

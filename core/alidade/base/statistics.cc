@@ -126,11 +126,11 @@ double Quantile(const std::vector<double>& ascending, double q) {
 }
 
 Interval ShareInterval(std::int64_t successes, std::int64_t trials) {
-  constexpr double kZ = 1.959963984540054;
+  constexpr double kQuantile = 1.959963984540054;
   const auto n = static_cast<double>(trials);
-  const double share = static_cast<double>(successes) / n, z2 = kZ * kZ / n;
+  const double share = static_cast<double>(successes) / n, z2 = kQuantile * kQuantile / n;
   const double centre = share + z2 / 2.0;
-  const double half = kZ * std::sqrt(share * (1.0 - share) / n + z2 / (4.0 * n));
+  const double half = kQuantile * std::sqrt(share * (1.0 - share) / n + z2 / (4.0 * n));
   return {std::max(0.0, (centre - half) / (1.0 + z2)), std::min(1.0, (centre + half) / (1.0 + z2))};
 }
 

@@ -39,8 +39,7 @@ EstimatorTables::EstimatorTables(const std::filesystem::path& folder, const std:
 RunTimes::RunTimes(std::vector<Timestamp> times, ColumnPool& pool)
     : all_(std::move(times)), pool_(pool) {
   std::ranges::sort(all_);
-  const auto repeated = std::ranges::unique(all_);
-  all_.erase(repeated.begin(), repeated.end());
+  all_.erase(std::unique(all_.begin(), all_.end()), all_.end());
   column_ = pool.AddTimes(all_, origin());
 }
 

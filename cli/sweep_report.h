@@ -15,7 +15,8 @@ namespace alidade::cli {
 /// Writes a sweep into its folder. The final path of the folder is `path`. Prints the reasons why
 /// runs failed. Unless `quiet` is true, also prints the tables, the command that repeats the run of
 /// the worst seed, and the path of the folder. `inputs` is the text of inputs.json. If the sweep
-/// was stopped, prints `command_line` with --resume. Returns the exit code. Errors: those of SweepFolder::Write.
+/// was stopped, prints `command_line` with --resume. Returns the exit code. Errors: those of
+/// SweepFolder::Write.
 ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
                      const SweepResult& result, const Config& config, const std::string& inputs,
                      const std::string& command_line, bool quiet);

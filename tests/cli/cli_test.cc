@@ -100,9 +100,8 @@ TEST_F(Cli, AnOptionWithOneValueIsRefusedIfItIsRepeated) {
 
 // A flag has no value, so a repetition has no effect. The last value of a key is used.
 TEST_F(Cli, FlagsAndSettingsMayBeRepeated) {
-  const Outcome run =
-      Call({"run", "config.yaml", "-o", "out", "--all", "--all", "--quiet", "--quiet",
-            "--set", "source.seed=5", "--set", "source.seed=6"});
+  const Outcome run = Call({"run", "config.yaml", "-o", "out", "--all", "--all", "--quiet",
+                            "--quiet", "--set", "source.seed=5", "--set", "source.seed=6"});
   EXPECT_EQ(run.code, 0) << run.err;
   EXPECT_TRUE(Contains(Read("out/config.resolved.yaml"), "seed: 6")) << run.err;
   EXPECT_FALSE(Contains(Read("out/config.resolved.yaml"), "seed: 5"));

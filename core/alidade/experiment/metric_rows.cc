@@ -281,8 +281,8 @@ bool IsOfSensor(const RunResult& result, const MetricKey& key) {
 
 constexpr int kErrorPriority = 1;  ///< priority of rmse in kMetrics
 
-/// Returns the relevance of a metric or count, from 1; 0 if it is not relevant. The error of a block
-/// of a sensor is its error at the end.
+/// Returns the relevance of a metric or count, from 1; 0 if it is not relevant. The error of a
+/// block of a sensor is its error at the end.
 int PriorityOf(const RunResult& result, const MetricKey& key) {
   constexpr int kAcceptedPriority = 4;
   if (!key.segment.empty()) return 0;
@@ -297,9 +297,11 @@ std::string ReferenceLine(const RunResult& result) {
   return reference.empty() ? "" : '\n' + reference + '\n';
 }
 
-/// Formats a table with the estimators as columns or as rows, whichever needs fewer lines.
-std::string ShorterTable(const Table& table, std::size_t width) {
+/// Formats a table with the estimators as columns. If it is wider than a line and shorter with the
+/// estimators as rows, exchanges rows and columns.
+std::string FittedTable(const Table& table, std::size_t width) {
   const std::string columns = FormatTable(table, TableFormat::kText, width);
+  if (columns.find("\n\n") == columns.npos) return columns;
   const std::string rows = FormatTable(Transposed(table), TableFormat::kText, width);
   return std::ranges::count(rows, '\n') < std::ranges::count(columns, '\n') ? rows : columns;
 }
@@ -401,7 +403,7 @@ std::string MainTable(const RunResult& result, const std::vector<std::string>& k
   const std::size_t all_rows = ComparisonRows(result).size();
   while (true) {
     const std::string table =
-        ShorterTable(MakeTable(NamesOf(result.estimators), rows), width) + ReferenceLine(result) +
+        FittedTable(MakeTable(NamesOf(result.estimators), rows), width) + ReferenceLine(result) +
         (all_rows > rows.size()
              ? '\n' + std::to_string(all_rows - rows.size()) + " more rows: --all\n"
              : "");

@@ -76,7 +76,8 @@ std::string ReplaceAll(std::string text, std::string_view old, std::string_view 
   return text;
 }
 
-/// Column of numbers. Its header may be wrapped, also after the point of a name. The decimal points of its cells are below each other.
+/// Column of numbers. Its header may be wrapped, also after the point of a name. The decimal
+/// points of its cells are below each other.
 class Column {
  public:
   Column(const Table& table, std::size_t index) {

@@ -64,8 +64,8 @@ std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKin
   return sorted_rows;
 }
 
-/// Returns rows with the mean. If `with_intervals` is true, the rows also contain [p05, p95]. The three
-/// numbers are formatted as columns of one table, so all numbers of a row have the same unit.
+/// Returns rows with the mean. If `with_intervals` is true, the rows also contain [p05, p95]. The
+/// three numbers are formatted as columns of one table, so all numbers of a row have the same unit.
 std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool with_intervals,
                                  const std::vector<RowKind>& kinds) {
   RunResult result;

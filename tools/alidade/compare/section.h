@@ -18,7 +18,8 @@ struct Section {
   bool transposed = false;  ///< true: on a terminal, each element of `columns` is a row
 };
 
-/// Formats sections as lines for a terminal of this width, as Markdown, or as LaTeX without packages.
+/// Formats sections as lines for a terminal of this width, as Markdown, or as LaTeX without
+/// packages.
 std::string SectionsText(const std::vector<Section>& sections, TableStyle style,
                          std::size_t width = kDefaultTextWidth);
 

@@ -239,8 +239,8 @@ std::string SharedText(const std::vector<Evaluation>& evaluations) {
   return text + '.';
 }
 
-/// Appends the rows with the mean, the minimum and the maximum of the errors of one relation, if the
-/// column `header` of the summary contains these errors.
+/// Appends the rows with the mean, the minimum and the maximum of the errors of one relation, if
+/// the column `header` of the summary contains these errors.
 void AppendExtent(const std::string& header, bool relative,
                   const std::vector<Evaluation>& evaluations,
                   std::vector<internal::TableRow>& rows) {

@@ -12,8 +12,8 @@
 /// the entry `failed`.
 namespace alidade {
 
-/// Returns a text for a terminal of this width. For one evaluation, the text contains all statistics. For several
-/// evaluations, the text is a table with a column for each evaluation.
+/// Returns a text for a terminal of this width. For one evaluation, the text contains all
+/// statistics. For several evaluations, the text is a table with a column for each evaluation.
 std::string EvaluationText(const std::vector<Evaluation>& evaluations,
                            std::size_t width = internal::kDefaultTextWidth);
 

@@ -184,12 +184,12 @@ struct SweepSummary {
 /// Summarises each estimator over all runs.
 std::vector<SweepSummary> Summarise(const SweepResult& result);
 
-/// Formats the counts of verdicts and the statistics of the main metrics for a terminal of this width.
-/// `summaries` is the result of Summarise(result).
+/// Formats the counts of verdicts and the statistics of the main metrics for a terminal of this
+/// width. `summaries` is the result of Summarise(result).
 std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary>& summaries,
                        std::size_t width = internal::kDefaultTextWidth);
-/// Formats the means of the main metrics in a table for each estimator, with a row for each value. A
-/// `*` marks the least error of each block, and the value of NEES or NIS that is nearest to 1.
+/// Formats the means of the main metrics in a table for each estimator, with a row for each value.
+/// A `*` marks the least error of each block, and the value of NEES or NIS that is nearest to 1.
 std::string SweepTable(const VariedSweep& sweep, std::size_t width = internal::kDefaultTextWidth);
 
 /// Output folder of a sweep (docs/cli.md). It contains sweep.json, runs.csv, table.md, report.html,

@@ -180,7 +180,7 @@ ExitCode RunBundle(const BundleArguments& arguments) {
     folder->Save(file, result, rms_before, rms_after);
     text += ReportLine(arguments.folder);
   }
-  if (!arguments.quiet) Print(text);
+  if (!arguments.quiet) PrintText(text);
   if (result.end == BundleEnd::kFailed) PrintErrors(arguments.problem + ": " + result.message);
   if (result.end == BundleEnd::kOutOfIterations)
     PrintNote("the adjustment has not converged: " + result.message +

@@ -61,12 +61,12 @@ void RequireModels(const CheckArguments& arguments, const std::vector<PluginEntr
   }
 }
 
-/// Checks a model with the given parameters, and prints the findings. Returns true if a check
-/// failed.
+/// Checks a model with the given parameters, and prints the findings and their number. Returns true
+/// if a check failed.
 bool CheckAndPrint(const PluginEntry& entry, const Node& parameters, const CheckOptions& options) {
   const auto findings = CheckModel(entry, parameters, options);
   const std::string prefix = parameters.path().empty() ? "" : parameters.path() + ": ";
-  Print(prefix + CheckText(entry, findings));
+  PrintText(prefix + CheckText(entry, findings));
   return AnyFailure(findings);
 }
 

@@ -25,7 +25,8 @@ using Action = std::function<ExitCode()>;
 void AddRun(CLI::App& program, Action& action, const std::string& command_line);
 void AddExplain(CLI::App& program, Action& action);
 void AddCompare(CLI::App& program, Action& action, const std::string& command_line);
-void AddSweep(CLI::App& program, Action& action);
+/// Adds the command `sweep`. A stopped sweep prints `command_line` with the option --resume.
+void AddSweep(CLI::App& program, Action& action, const std::string& command_line);
 void AddMerge(CLI::App& program, Action& action);
 /// Adds the command `replay`. `execute` runs a command; its argument is the command line without
 /// the name of the program.

@@ -50,7 +50,7 @@ std::string FormatComparison(const Comparison& comparison, const CompareArgument
   if (arguments.markdown) return CompareReport(comparison, TableStyle::kMarkdown);
   if (arguments.latex) return CompareReport(comparison, TableStyle::kLatex);
   return CompareReport(comparison, TableStyle::kText,
-                       arguments.all ? ReportRows::kAll : ReportRows::kMain);
+                       arguments.all ? ReportRows::kAll : ReportRows::kMain, OutputWidth());
 }
 
 /// Prints the comparison, and the path of the page in the folder of the comparison. The output in
@@ -59,7 +59,8 @@ void Report(const Comparison& comparison, const CompareArguments& arguments,
             const fs::path& folder) {
   const bool is_text = !arguments.json && !arguments.markdown && !arguments.latex;
   const bool has_report = is_text && !folder.empty() && !arguments.quiet;
-  Print(FormatComparison(comparison, arguments) + (has_report ? ReportLine(folder) : ""));
+  const std::string text = FormatComparison(comparison, arguments);
+  is_text ? PrintText(text + (has_report ? ReportLine(folder) : "")) : Print(text);
 }
 
 /// Returns the exit code of the command. If the comparison is withheld, prints the reason. The code
@@ -86,13 +87,6 @@ void AddFiles(auto& folder, const Comparison& comparison) {
   folder.AddFile("compare.json", CompareJson(comparison));
   folder.AddFile("compare.md", CompareReport(comparison, TableStyle::kMarkdown));
   folder.AddFile("compare.tex", CompareReport(comparison, TableStyle::kLatex));
-}
-
-/// Formats a duration: `83 s`, `12 min`, `3.4 h`.
-std::string DurationText(double s) {
-  if (s < 120.0) return internal::RoundedText(s, 2) + " s";
-  return s < 7200.0 ? internal::RoundedText(s / 60.0, 2) + " min"
-                    : internal::RoundedText(s / 3600.0, 2) + " h";
 }
 
 /// Forecast of the total duration. The forecast is printed at most once, and only if it is at least
@@ -185,7 +179,10 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
     forecast.UpdateFromFrames(done, total);
     progress.Show(done, total);
   };
-  options.stop = StopRequested;
+  options.stop = [&progress] {
+    progress.Tick();
+    return StopRequested();
+  };
   const RunResult result = Run(compared.experiment, options);
   progress.Clear();
   CompareOptions run_options = arguments.options;
@@ -230,6 +227,9 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExper
   options.progress = [&](std::int64_t done, std::int64_t total) {
     forecast.UpdateFromRuns(total);
     progress.Show(done, total);
+  };
+  options.first_run_progress = [&](std::int64_t done, std::int64_t total) {
+    progress.Show(done, total, "frames of the first run");
   };
   options.stop = StopRequested;
   SweepFolder sweep_folder(folder, arguments.force);

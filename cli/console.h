@@ -15,8 +15,21 @@ namespace alidade::cli {
 /// reports an error instead of ending the process.
 void PrepareConsole();
 
-/// Writes `text` to standard output. Error: kIo if a byte cannot be written.
+/// Writes `text` to standard output. If the reader has closed the pipe, requests a stop, and this
+/// and all later texts are lost without an error. Error: kIo if a byte cannot be written.
 void Print(std::string_view text);
+/// Returns true if the reader of standard output has closed the pipe.
+bool OutputClosed();
+
+/// Returns the width of a line on standard output: that of the terminal, else the variable COLUMNS,
+/// else internal::kDefaultTextWidth. The result is limited to 60 to 200.
+std::size_t OutputWidth();
+/// Prints text for a person: wraps its lines to OutputWidth() and, on a terminal, colours verdicts,
+/// the words of `check` and `doctor`, and numbers that are marked by ` !`. Errors: those of Print.
+void PrintText(std::string_view text);
+
+/// Formats a duration: `0.35 s`, `83 s`, `12 min`, `3.4 h`.
+std::string DurationText(double s);
 
 /// Writes a page to a file. Errors: kCannotCreate, kIo.
 void WritePageFile(const std::filesystem::path& file, std::string_view page);
@@ -35,8 +48,9 @@ void PrintNote(std::string_view text);
 /// `LEVEL: TEXT`. The level is in colour on a terminal.
 void ShowLog(LogLevel minimum_level);
 
-/// Progress line of a command, printed on standard error. Nothing is printed if standard error is
-/// not a terminal, or if `quiet` is true.
+/// Progress line of a command, printed on standard error: the number of units that are done, the
+/// rate and the time left. Nothing is printed if standard error is not a terminal, or if `quiet` is
+/// true. Threads must not call it at the same time.
 class Progress {
  public:
   Progress(const char* unit, bool quiet);
@@ -45,18 +59,28 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   /// Shows the progress. `total` is negative if it is unknown.
-  void Show(std::int64_t done, std::int64_t total);
+  void Show(std::int64_t done, std::int64_t total) { Show(done, total, unit_); }
+  /// Shows the progress of a part of the command, which has other units.
+  void Show(std::int64_t done, std::int64_t total, const char* unit);
+  /// Shows that a step takes long: adds its duration to the line. Called during the step.
+  void Tick();
   void Clear();
 
  private:
+  using Clock = std::chrono::steady_clock;
+
+  void Write(std::string line);
+
   const char* unit_;
   bool enabled_;
-  std::chrono::steady_clock::time_point next_;
+  Clock::time_point begin_ = Clock::now(), next_ = {}, shown_ = Clock::now();
+  std::string line_;
 };
 
 /// Installs a handler for SIGINT, SIGTERM and SIGHUP. An ignored SIGHUP remains ignored. The first
-/// signal requests that the command stop. A second signal ends the process at once.
-void StopOnSignals();
+/// signal requests that the command stop, and prints `answer` if standard error is a terminal. A
+/// second signal ends the process at once.
+void StopOnSignals(const char* answer = "finishing the current frame");
 bool StopRequested();
 
 }  // namespace alidade::cli

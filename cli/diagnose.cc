@@ -110,10 +110,10 @@ std::vector<ParameterTests> TestEach(const std::vector<EstimatorInnovations>& es
 
 ExitCode DiagnoseRun(const DiagnoseArguments& arguments) {
   const std::vector<EstimatorInnovations> estimators = ReadEstimators(arguments);
-  if (!arguments.json) Print(DiagnosisText(estimators));
+  if (!arguments.json) PrintText(DiagnosisText(estimators));
   std::vector<ParameterTests> tests;
   if (arguments.why) tests = TestEach(estimators, arguments);
-  Print(arguments.json ? DiagnosisJson(estimators, tests) : ParameterTestsText(tests));
+  arguments.json ? Print(DiagnosisJson(estimators, tests)) : PrintText(ParameterTestsText(tests));
   return ExitCode::kOk;
 }
 

@@ -27,21 +27,32 @@ if a line starts with fail, else 0.)";
 class Diagnosis {
  public:
   void Ok(const std::string& text) { text_ += "ok    " + text + '\n'; }
-  void Warn(const std::string& text, const std::string& remedy) { Add("warn  ", text, remedy); }
+  void Warn(const std::string& text, const std::string& remedy) {
+    ++warnings_;
+    Add("warn  ", text, remedy);
+  }
   void Fail(const std::string& text, const std::string& remedy) {
-    failed_ = true;
+    ++failures_;
     Add("fail  ", text, remedy);
   }
   const std::string& text() const { return text_; }
-  bool failed() const { return failed_; }
+  bool failed() const { return failures_ > 0; }
+  std::string Summary() const {
+    if (failed()) return Counted(failures_, "failure") + ", " + Counted(warnings_, "warning");
+    if (warnings_ > 0) return "the installation works, with " + Counted(warnings_, "warning");
+    return "all is well";
+  }
 
  private:
   void Add(const char* level, const std::string& text, const std::string& remedy) {
     text_ += level + text + '\n';
     if (!remedy.empty()) text_ += "      remedy: " + remedy + '\n';
   }
+  static std::string Counted(int count, const char* noun) {
+    return std::to_string(count) + ' ' + noun + (count == 1 ? "" : "s");
+  }
   std::string text_;
-  bool failed_ = false;
+  int warnings_ = 0, failures_ = 0;
 };
 
 std::string EigenVersion() {
@@ -166,7 +177,7 @@ ExitCode RunDoctor(const std::vector<std::string>& paths) {
   CheckPlugins(paths, diagnosis);
   CheckEnvironment(diagnosis);
   CheckCurrentFolder(diagnosis);
-  Print(diagnosis.text());
+  PrintText(diagnosis.text() + '\n' + diagnosis.Summary() + '\n');
   return diagnosis.failed() ? ExitCode::kFound : ExitCode::kOk;
 }
 

@@ -3,7 +3,6 @@
 #include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <optional>
 
@@ -100,16 +99,35 @@ std::string Text(const std::vector<Evaluation>& evaluations, OutputFormat output
     case OutputFormat::kText:
       break;
   }
-  return EvaluationText(evaluations);
+  return EvaluationText(evaluations, OutputWidth());
 }
 
-/// If several estimates have the same label, replaces each of these labels by the name of the
-/// estimate's file.
+/// Returns the last `count` parts of a path without its extension.
+std::string LastParts(const std::filesystem::path& path, int count) {
+  std::filesystem::path label = path.stem(), folder = path.parent_path();
+  for (; count > 1 && folder.has_filename(); --count, folder = folder.parent_path()) {
+    label = folder.filename() / label;
+  }
+  return label.string();
+}
+
+/// Replaces the labels that several estimates have by the shortest ends of their paths that differ.
 void MakeUnique(std::vector<Evaluation>& evaluations) {
-  std::map<std::string, int> counts;
-  for (const Evaluation& evaluation : evaluations) ++counts[evaluation.label];
+  constexpr int kMaxParts = 20;
+  const auto is_repeated = [&](const std::string& label) {
+    return std::ranges::count(evaluations, label, &Evaluation::label) > 1;
+  };
+  std::vector<Evaluation*> repeated;
   for (Evaluation& evaluation : evaluations) {
-    if (counts[evaluation.label] > 1) evaluation.label = evaluation.estimate.name;
+    if (is_repeated(evaluation.label)) repeated.push_back(&evaluation);
+  }
+  for (int parts = 1; parts <= kMaxParts; ++parts) {
+    const bool is_done = std::ranges::none_of(
+        repeated, [&](const Evaluation* evaluation) { return is_repeated(evaluation->label); });
+    if (is_done) return;
+    for (Evaluation* const evaluation : repeated) {
+      evaluation->label = LastParts(evaluation->estimate.name, parts);
+    }
   }
 }
 
@@ -176,7 +194,8 @@ ExitCode RunEval(const EvalArguments& arguments) {
     }
   }
   MakeUnique(evaluations);
-  Print(Text(evaluations, arguments.output_format));
+  const std::string text = Text(evaluations, arguments.output_format);
+  arguments.output_format == OutputFormat::kText ? PrintText(text) : Print(text);
   if (!arguments.page.empty()) {
     WritePageFile(arguments.page, EvaluationPage(evaluations));
     if (arguments.output_format == OutputFormat::kText) Print(ReportLine(arguments.page));

@@ -17,7 +17,7 @@ constexpr const char* kExplainFooter = R"(Example:
 ExitCode ExplainConfig(const Input& input) {
   const Config config = input.Load();
   const PluginHost host = input.Host(config);
-  Print(Explain(config, BuildExperiment(config, host)));
+  PrintText(Explain(config, BuildExperiment(config, host)));
   return ExitCode::kOk;
 }
 

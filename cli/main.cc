@@ -9,6 +9,7 @@
 #include "alidade/base/text.h"
 #include "command.h"
 #include "console.h"
+#include "help.h"
 #include "usage.h"
 
 namespace alidade::cli {
@@ -28,15 +29,6 @@ constexpr const char* kProgramFooter = R"(Examples:
 `alidade COMMAND --help` describes a command. Exit codes: 0 ok, 1 problem found, 2 usage,
 65 bad data, 66 input missing, 69 plugin missing or refused, 70 internal, 73 cannot create output,
 74 input/output, 75 stopped by a signal, 77 not trusted, 78 bad config, 79 diverged.)";
-
-class Format : public CLI::Formatter {
- public:
-  Format() {
-    label("SUBCOMMAND", "COMMAND");
-    label("Positionals", "Arguments");
-    column_width(28);
-  }
-};
 
 using ArgumentList = std::vector<std::string>;
 
@@ -83,23 +75,23 @@ ExitCode Execute(const ArgumentList& arguments);
 
 void Describe(CLI::App& program, Action& action, const std::string& command_line,
               std::string& log_level) {
-  program.formatter(std::make_shared<Format>());
+  program.formatter(std::make_shared<HelpFormat>(OutputWidth()));
   program.footer(kProgramFooter);
   program.set_version_flag("--version", "alidade " ALIDADE_VERSION, "print the version and exit");
   program.require_subcommand(1);
   AddRun(program, action, command_line);
   AddCompare(program, action, command_line);
-  AddSweep(program, action);
+  AddSweep(program, action, command_line);
   AddMerge(program, action);
   AddReplay(program, action, Execute);
   AddSimulate(program, action);
   AddBundle(program, action);
-  AddExplain(program, action);
-  AddPlugins(program, action);
-  AddCheck(program, action);
   AddEval(program, action);
   AddDiagnose(program, action);
   AddReport(program, action);
+  AddExplain(program, action);
+  AddPlugins(program, action);
+  AddCheck(program, action);
   AddDoctor(program, action);
   const auto polish = [&log_level](const auto& self, CLI::App& app) -> void {
     app.get_help_ptr()->description("print this help and exit");
@@ -108,7 +100,7 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
         ->option_text("LEVEL")
         ->check(IsLogLevel);
     for (CLI::App* command : app.get_subcommands({})) {
-      command->group("Commands");
+      command->group(GroupOfCommand(command->get_name()));
       self(self, *command);
     }
   };
@@ -137,7 +129,7 @@ ExitCode UsageError(const CLI::App& command, const std::string& message) {
 ExitCode Fail(const CLI::App& program, const CLI::ParseError& error) {
   const CLI::App& command = InnermostCommand(program);
   if (dynamic_cast<const CLI::CallForHelp*>(&error) != nullptr) {
-    Print(program.help());
+    PrintText(program.help());
     return ExitCode::kOk;
   }
   if (dynamic_cast<const CLI::CallForVersion*>(&error) != nullptr) {
@@ -187,5 +179,8 @@ int main(int argc, char** argv) {
   // not replace a value that the user has set.
   setenv("GLOG_minloglevel", "3", 0);
   alidade::cli::PrepareConsole();
-  return static_cast<int>(alidade::cli::RunGuarded(argc, argv));
+  const alidade::ExitCode code = alidade::cli::RunGuarded(argc, argv);
+  // A reader that has closed the pipe has read all that it needs.
+  const bool is_enough = alidade::cli::OutputClosed() && code == alidade::ExitCode::kStopped;
+  return static_cast<int>(is_enough ? alidade::ExitCode::kOk : code);
 }

@@ -35,10 +35,10 @@ ExitCode Merge(const MergeArguments& arguments) {
   SweepFolder folder({path, arguments.force, merged.inputs}, merged.config);
   if (!merged.variation) {
     return FinishSweep(folder, path, merged.results.front(), merged.config, merged.inputs,
-                       arguments.quiet);
+                       "alidade merge", arguments.quiet);
   }
   const VariedSweep sweep{*merged.variation, merged.results, merged.warning};
-  return FinishSweep(folder, path, sweep, merged.config, arguments.quiet);
+  return FinishSweep(folder, path, sweep, merged.config, "alidade merge", arguments.quiet);
 }
 
 }  // namespace

@@ -38,7 +38,8 @@ std::shared_ptr<PluginsArguments> AddListing(CLI::App& command, Action& action, 
   command.callback([&action, arguments, listing, on_refusal] {
     action = [arguments, listing, on_refusal] {
       const PluginHost host(Absolute(arguments->paths), on_refusal);
-      Print(listing(host, *arguments));
+      const std::string text = listing(host, *arguments);
+      arguments->json ? Print(text) : PrintText(text);
       return ExitCode::kOk;
     };
   });

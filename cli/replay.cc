@@ -105,7 +105,7 @@ ExitCode Replay(const ReplayArguments& arguments,
   if (arguments.json) {
     Print(internal::ReplayJson(result));
   } else if (!arguments.quiet || !result.equal()) {
-    Print(internal::ReplayText(result, arguments.folder));
+    PrintText(internal::ReplayText(result, arguments.folder));
   }
   return result.equal() ? ExitCode::kOk : ExitCode::kFound;
 }

@@ -45,7 +45,7 @@ ExitCode WriteReport(const ReportArguments& arguments) {
   }
   ProtectInputs(output, {arguments.reference});
   WritePageFile(output, has_reference ? TrajectoryPage(arguments) : ReportPage(path));
-  Print("report   " + output.string() + '\n');
+  PrintText("report   " + output.string() + '\n');
   return ExitCode::kOk;
 }
 

@@ -3,20 +3,15 @@
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-#include <algorithm>
-#include <iomanip>
-#include <locale>
 #include <memory>
-#include <sstream>
 
-#include "alidade/experiment/metric_rows.h"
 #include "alidade/record/follower.h"
 #include "alidade/record/recorder.h"
 #include "alidade/record/run_viewer.h"
 #include "alidade/replay/run_inputs.h"
-#include "alidade/report/conclusion.h"
 #include "command.h"
 #include "console.h"
+#include "run_report.h"
 #include "video_name.h"
 
 namespace alidade::cli {
@@ -38,67 +33,18 @@ struct RunArguments {
   Input input;
   std::string folder;
   std::optional<std::uint64_t> seed;
-  bool force = false, quiet = false, covariances = false, all = false;
+  bool force = false, quiet = false, verbose = false, covariances = false, all = false;
   bool follow = false, view = false, strict = false;
   std::string video;
 };
 
-/// Events of one estimator that have the same kind.
-struct EventGroup {
-  EventKind kind;
-  std::vector<const Event*> events;
-};
-
-std::vector<EventGroup> Group(const std::vector<Event>& events) {
-  std::vector<EventGroup> groups;
-  for (const Event& event : events) {
-    const auto same = [&](const EventGroup& group) { return group.kind == event.kind; };
-    auto group = std::find_if(groups.begin(), groups.end(), same);
-    if (group == groups.end()) group = groups.insert(group, {event.kind, {}});
-    group->events.push_back(&event);
-  }
-  return groups;
-}
-
-std::string EventLine(const Event& event) {
-  if (event.timestamp == kNoTimestamp) return event.text;
-  std::ostringstream line;
-  line.imbue(std::locale::classic());
-  line << "t = " << std::fixed << std::setprecision(3) << Seconds(event.timestamp) << " s: ";
-  return line.str() + event.text;
-}
-
-/// Returns a summary of the estimators' events, with a few lines for each kind of event.
-std::string EventSummary(const RunResult& result) {
-  constexpr std::size_t kShown = 3;
-  std::string text;
-  for (const EstimatorResult& estimator : result.estimators) {
-    for (const EventGroup& group : Group(estimator.events)) {
-      const std::size_t count = group.events.size();
-      text += estimator.name + ": " + ToString(group.kind);
-      if (count > 1) text += ", " + std::to_string(count) + " times";
-      text += '\n';
-      for (std::size_t i = 0; i < std::min(count, kShown); ++i) {
-        text += "  " + EventLine(*group.events[i]) + '\n';
-      }
-      if (count > kShown) {
-        text += "  ... and " + std::to_string(count - kShown) + " more, in " + estimator.name +
-                "/events.csv\n";
-      }
-    }
-  }
-  return text;
-}
-
-std::string Summary(const RunResult& result, const std::string& table, const Recorder& recorder,
-                    const std::string& video) {
-  std::string text = VerdictText(result);
-  for (const std::string& line : internal::ConclusionLines(recorder.conclusions())) {
-    text += line + '\n';
-  }
-  text += '\n' + table;
-  if (const std::string events = EventSummary(result); !events.empty()) text += '\n' + events;
-  if (!video.empty()) text += "\nwrote " + video + '\n';
+/// Returns the text on standard output after a run.
+std::string Summary(const RunArguments& arguments, const RunReport& report, const RunResult& result,
+                    const Recorder& recorder) {
+  std::string text = arguments.verbose
+                         ? report.Verbose(result, recorder.conclusions(), arguments.all)
+                         : report.Short(result, arguments.all);
+  if (!arguments.video.empty()) text += "\nvideo    " + arguments.video + '\n';
   return text + ReportLine(recorder.folder());
 }
 
@@ -151,12 +97,20 @@ ExitCode RunConfig(const RunArguments& arguments) {
 
   Progress progress("frames", arguments.quiet);
   RunOptions options;
-  options.observers = {&recorder};
+  RunReport report(OutputWidth());
+  options.observers = {&recorder, &report};
   Follower follower(Print);
   if (arguments.follow) options.observers.push_back(&follower);
   if (viewer) options.observers.push_back(viewer.get());
-  options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
-  options.stop = StopRequested;
+  std::int64_t total_frames = -1;
+  options.progress = [&](std::int64_t done, std::int64_t total) {
+    total_frames = total;
+    progress.Show(done, total);
+  };
+  options.stop = [&progress] {
+    progress.Tick();
+    return StopRequested();
+  };
   const RunResult result = Run(experiment, options);
   progress.Clear();
   // Without a frame there is nothing to record, and the recorder removes the run folder.
@@ -165,13 +119,14 @@ ExitCode RunConfig(const RunArguments& arguments) {
   recorder.Finish(result);
   if (viewer) viewer->Close();
   if (!arguments.quiet && !arguments.follow) {
-    const std::string table = arguments.all
-                                  ? ComparisonTable(result)
-                                  : internal::MainTable(result, internal::SubjectsOf(experiment));
-    Print(Summary(result, table, recorder, arguments.video));
+    PrintText(Summary(arguments, report, result, recorder));
   }
   if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
-  if (result.status == RunStatus::kStopped) PrintNote(result.reason);
+  if (result.status == RunStatus::kStopped && !OutputClosed()) {
+    PrintNote(result.reason +
+              (total_frames > result.frames ? " of " + std::to_string(total_frames) : "") +
+              "; the results so far are in " + recorder.folder().string());
+  }
   return arguments.strict && result.code == ExitCode::kOk && !IsAcceptable(result)
              ? ExitCode::kFound
              : result.code;
@@ -188,7 +143,9 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
             "run folder; default: the config's `output:`, or the name of the config, in runs/");
   AddSeed(command, arguments->seed);
   command.add_flag("--force", arguments->force, "replace the run folder if it exists");
-  command.add_flag("--all", arguments->all, "print all rows of the table, not only ten");
+  command.add_flag("--all", arguments->all, "print all rows of the table");
+  command.add_flag("-v,--verbose", arguments->verbose,
+                   "also print the findings, the events and all reasons of the verdicts");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--strict", arguments->strict,
                    "exit with code 1 if a verdict is neither `consistent` nor `not tested`");

@@ -5,6 +5,7 @@
 #include <CLI/Formatter.hpp>
 #include <memory>
 
+#include "alidade/base/text.h"
 #include "command.h"
 #include "console.h"
 #include "video_name.h"
@@ -52,7 +53,9 @@ ExitCode RunSimulate(const SimulateArguments& arguments) {
     ReportOutput(output);
     std::string text = std::to_string(result.frames) + " frames\nwrote " + path.string() + '\n';
     for (const std::string& file : result.files) text += "  " + (path / file).string() + '\n';
-    Print(text);
+    text += "\nrun it with: alidade run CONFIG --set source.path=" +
+            internal::ShellWord(path.string()) + "   if source.type of CONFIG is tracks or csv\n";
+    PrintText(text);
   }
   if (!result.stopped) return ExitCode::kOk;
   PrintNote("stopped after " + std::to_string(result.frames) +

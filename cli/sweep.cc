@@ -32,6 +32,7 @@ FOLDER.partial. A sweep that was stopped or killed leaves this folder, and --res
 runs. `alidade merge` merges the folders of shards.)";
 
 struct SweepArguments {
+  std::string command;  ///< complete command line
   Input input;
   std::string folder;
   std::string vary;  ///< "": no key is varied
@@ -93,7 +94,8 @@ ExitCode SweepSeeds(const Task& task, SweepOptions options) {
   const std::unique_ptr<SweepFolder> folder = OpenFolder(task, options);
   const SweepResult result = Sweep(task.config, task.host, options);
   task.progress.Clear();
-  return FinishSweep(*folder, task.path, result, task.config, task.inputs, task.arguments.quiet);
+  return FinishSweep(*folder, task.path, result, task.config, task.inputs, task.arguments.command,
+                     task.arguments.quiet);
 }
 
 ExitCode SweepValues(const Task& task, SweepOptions options) {
@@ -101,7 +103,8 @@ ExitCode SweepValues(const Task& task, SweepOptions options) {
   const std::unique_ptr<SweepFolder> folder = OpenFolder(task, options);
   const VariedSweep sweep = SweepVariation(task.config, task.host, options, variation);
   task.progress.Clear();
-  return FinishSweep(*folder, task.path, sweep, task.config, task.arguments.quiet);
+  return FinishSweep(*folder, task.path, sweep, task.config, task.arguments.command,
+                     task.arguments.quiet);
 }
 
 /// For --resume: returns true if `folder` is a finished sweep of this config and these inputs.
@@ -158,7 +161,7 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   const std::filesystem::path& path = output.folder;
   const std::vector<Config> configs = ConfigsOf(arguments, config);
   const PluginHost host = arguments.input.HostFor(config, configs);
-  StopOnSignals();
+  StopOnSignals("stopping the unfinished runs");
   const std::string inputs =
       arguments.input.InputsText(config, ArgumentsOf(arguments), configs,
                                  internal::HashFiles(internal::FindUsedPlugins(configs, host)));
@@ -173,6 +176,9 @@ ExitCode RunSweep(const SweepArguments& arguments) {
     // Progress implies that the config is valid, so the output folder can be reported now.
     if (!std::exchange(is_reported, true)) ReportOutput(output);
     progress.Show(done, total);
+  };
+  options.first_run_progress = [&](std::int64_t done, std::int64_t total) {
+    progress.Show(done, total, "frames of the first run");
   };
   options.stop = StopRequested;
   const Task task{arguments, config, host, path, inputs, progress};
@@ -193,9 +199,10 @@ CLI::Option* AddVariation(CLI::App& command, SweepArguments& arguments, Variatio
 
 }  // namespace
 
-void AddSweep(CLI::App& program, Action& action) {
+void AddSweep(CLI::App& program, Action& action, const std::string& command_line) {
   CLI::App& command = *program.add_subcommand("sweep", "Run a config with many seeds");
   const auto arguments = std::make_shared<SweepArguments>();
+  arguments->command = command_line;
   arguments->input.AddTo(command);
   command.add_option("--runs", arguments->options.runs, "total number of runs, over all shards")
       ->option_text("N")

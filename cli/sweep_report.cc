@@ -11,8 +11,6 @@
 namespace alidade::cli {
 namespace {
 
-constexpr const char* kResume = "; --resume continues the sweep";
-
 /// Prints the reasons why the first few runs failed. If more runs failed, also prints the number of
 /// failed runs. Each line begins with `prefix`. Returns true if a run failed.
 bool ReportFailures(const SweepResult& result, const std::string& prefix) {
@@ -45,6 +43,22 @@ std::string WorstSeedText(const SweepResult& result, const std::filesystem::path
   return internal::WorstSeedLines(worst) + "repeat the run of a seed: " + command + '\n';
 }
 
+/// Returns the command that continues a stopped sweep, as the end of a message. `command_line` is
+/// the command that was stopped.
+std::string ContinueText(std::string command_line, const std::filesystem::path& path) {
+  command_line += ' ';
+  const std::string force = " --force ";
+  if (const std::size_t found = command_line.find(force); found != command_line.npos) {
+    command_line.erase(found, force.size() - 1);
+  }
+  const bool has_output = command_line.find(" -o") != command_line.npos ||
+                          command_line.find(" --output") != command_line.npos;
+  const bool resumes = command_line.find(" --resume ") != command_line.npos;
+  return "; continue with: " + command_line +
+         (has_output ? "" : "-o " + internal::ShellWord(path.string()) + ' ') +
+         (resumes ? "" : "--resume");
+}
+
 ExitCode CodeOf(bool stopped, bool failed) {
   if (stopped) return ExitCode::kStopped;
   return failed ? ExitCode::kFound : ExitCode::kOk;
@@ -54,21 +68,23 @@ ExitCode CodeOf(bool stopped, bool failed) {
 
 ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
                      const SweepResult& result, const Config& config, const std::string& inputs,
-                     bool quiet) {
+                     const std::string& command_line, bool quiet) {
   const bool failed = ReportFailures(result, "");
-  if (result.stopped) ReportStopped(result.done.size(), result.runs, kResume);
+  if (result.stopped)
+    ReportStopped(result.done.size(), result.runs, ContinueText(command_line, path));
   const std::vector<SweepSummary> summaries = Summarise(result);
   folder.Write(result, summaries, config);
   if (!quiet) {
     const std::filesystem::path written = result.stopped ? internal::PartialOf(path) : path;
-    Print(SweepTable(result, summaries) + WorstSeedText(result, written, inputs) +
-          ReportLine(written));
+    PrintText(SweepTable(result, summaries, OutputWidth()) +
+              WorstSeedText(result, written, inputs) + ReportLine(written));
   }
   return CodeOf(result.stopped, failed);
 }
 
 ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
-                     const VariedSweep& sweep, const Config& config, bool quiet) {
+                     const VariedSweep& sweep, const Config& config,
+                     const std::string& command_line, bool quiet) {
   const Variation& variation = sweep.variation;
   bool failed = false;
   std::size_t done = 0;
@@ -78,11 +94,12 @@ ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
     done += sweep.results[v].done.size();
   }
   const auto values = static_cast<std::int64_t>(variation.values.size());
-  if (sweep.stopped()) ReportStopped(done, values * sweep.results.front().runs, kResume);
+  if (sweep.stopped())
+    ReportStopped(done, values * sweep.results.front().runs, ContinueText(command_line, path));
   folder.Write(sweep, config);
   if (!quiet) {
     const std::filesystem::path written = sweep.stopped() ? internal::PartialOf(path) : path;
-    Print(SweepTable(sweep) + ReportLine(written));
+    PrintText(SweepTable(sweep, OutputWidth()) + ReportLine(written));
   }
   return CodeOf(sweep.stopped(), failed);
 }

@@ -187,9 +187,7 @@ TEST_F(OutputCli, ARefusedConfigNamesNoFolder) {
   }
 }
 
-// The first eight rows are selected in two rounds. The first round selects five rows. The second
-// round selects three rows and ends before `accepted` of the second sensor.
-TEST_F(OutputCli, RunPrintsTenRowsAndAllOfThemIfAsked) {
+TEST_F(OutputCli, RunPrintsTheRelevantRowsAndAllOfThemIfAsked) {
   const auto labels = [](const std::string& out) {
     std::vector<std::string> found;
     std::istringstream lines(out);
@@ -202,19 +200,39 @@ TEST_F(OutputCli, RunPrintsTenRowsAndAllOfThemIfAsked) {
     }
     return found;
   };
-  const Outcome ten = Call({"run", "config.yaml"});
-  EXPECT_EQ(labels(ten.out),
+  const Outcome relevant = Call({"run", "config.yaml"});
+  EXPECT_EQ(labels(relevant.out),
             (std::vector<std::string>{
                 "verdict", "rmse target.depth [mm]", "rmse target.depth_rate [mm/s]",
-                "coverage95 target.depth [%]", "nees.mean target", "nees.mean template",
-                "nis.mean scale", "nis.mean stereo", "accepted scale", "accepted stereo"}))
-      << ten.out;
+                "rmse template.inverse_distance [1/m]", "NEES target", "NEES template",
+                "NIS stereo", "NIS scale", "used / given stereo", "used / given scale"}))
+      << relevant.out;
   const Outcome all = Call({"run", "config.yaml", "--all"});
   const std::size_t rows = labels(all.out).size();
   EXPECT_GT(rows, 10u) << all.out;
-  EXPECT_TRUE(Contains(ten.out, '\n' + std::to_string(rows - 10) + " more rows: --all\n"))
-      << ten.out;
+  EXPECT_TRUE(Contains(relevant.out, '\n' + std::to_string(rows - 10) + " more rows: --all\n"))
+      << relevant.out;
   EXPECT_FALSE(Contains(all.out, "more rows")) << all.out;
+}
+
+TEST_F(OutputCli, TheConfigSelectsTheRows) {
+  Write("rows.yaml",
+        testing::kDepthConfig +
+            "report: {rows: [lag_ms:target.depth, accepted:stereo, nis.mean:scale]}\n");
+  const std::string out = Call({"run", "rows.yaml"}).out;
+  const std::size_t lag = out.find("\nlag target.depth [ms] "),
+                    used = out.find("\nused / given stereo "), nis = out.find("\nNIS scale ");
+  EXPECT_LT(lag, used) << out;
+  EXPECT_LT(used, nis) << out;
+  EXPECT_NE(nis, out.npos) << out;
+  EXPECT_FALSE(Contains(out, "rmse ")) << out;
+  const Outcome unknown =
+      Call({"run", "config.yaml", "--set", "report={rows: [rmse:target.dept]}"});
+  EXPECT_EQ(unknown.code, 78);
+  EXPECT_TRUE(Contains(unknown.err, "report.rows[0]: metric 'rmse:target.dept' does not exist"))
+      << unknown.err;
+  EXPECT_TRUE(Contains(unknown.err, "did you mean 'rmse:target.depth'?")) << unknown.err;
+  EXPECT_EQ(Call({"run", "config.yaml", "--set", "report={row: []}"}).code, 78);
 }
 
 TEST_F(OutputCli, SaysThatTheCurrentFolderIsGone) {

@@ -57,7 +57,7 @@ TEST_F(SweepCli, SummarisesRunsThatRunWouldGive) {
       Call({"sweep", "config.yaml", "--runs", "1", "--first-seed", "7", "-o", "sweep"});
   EXPECT_EQ(sweep.code, 0) << sweep.err;
   EXPECT_TRUE(Contains(sweep.out, "rmse target.depth [mm]")) << sweep.out;
-  EXPECT_TRUE(Contains(sweep.out, "coverage95 target.depth [%]")) << sweep.out;
+  EXPECT_TRUE(Contains(sweep.out, "inside 95 % region target.depth [%]")) << sweep.out;
   EXPECT_EQ(Call({"run", "config.yaml", "--seed", "7", "-o", "run"}).code, 0);
   const Config summary = Json("sweep/sweep.json"), record = Json("run/run.json");
   EXPECT_EQ(summary.root().At("runs").Number(), 1);

@@ -88,7 +88,7 @@ TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
 }
 
 // Tests fault 89 of tests/faults/README.md.
-TEST_F(RunSafety, AReaderThatIsGoneIsAnErrorNotASignal) {
+TEST_F(RunSafety, AReaderThatIsGoneIsNeitherAnErrorNorASignal) {
   for (const Arguments& command : {Arguments{"run", "config.yaml", "-o", "out"},
                                    {"sweep", "config.yaml", "--runs", "1", "-o", "sweep"},
                                    {"explain", "config.yaml"},
@@ -100,12 +100,11 @@ TEST_F(RunSafety, AReaderThatIsGoneIsAnErrorNotASignal) {
     before_ = "exec 3<>pipe 1>pipe 3<&-";
     const Outcome outcome = Call(command);
     EXPECT_EQ(outcome.signal, 0) << command[0];
-    EXPECT_EQ(outcome.code, 74) << command[0];
-    EXPECT_TRUE(Contains(outcome.err, "error: <stdout>: cannot write: Broken pipe"))
-        << command[0] << outcome.err;
+    EXPECT_EQ(outcome.code, 0) << command[0];
+    EXPECT_EQ(outcome.err, "") << command[0];
     fs::remove(folder_ / "pipe");
   }
-  // The run and the sweep were completed before the output failed.
+  // The run and the sweep were completed before the output was lost.
   EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "ok");
   EXPECT_EQ(Json("sweep/sweep.json").root().At("runs_used").Number(), 1);
 }

@@ -89,6 +89,7 @@ class ProgramTest : public ::testing::Test {
     Write("config.yaml", kDepthConfig);
     Write("table.yaml", kTableConfig);
     ::unsetenv("ALIDADE_PLUGIN_PATH");
+    ::setenv("COLUMNS", "200", 1);  // long lines are not wrapped
     ::setenv("XDG_DATA_HOME", (folder_ / "data").c_str(), 1);
   }
 

@@ -8,6 +8,7 @@
 #include "alidade/experiment/calibration.h"
 #include "alidade/experiment/estimator_guide.h"
 #include "alidade/experiment/read_problem.h"
+#include "alidade/experiment/read_report.h"
 #include "alidade/experiment/run.h"
 #include "alidade/experiment/source_plugin.h"
 #include "alidade/experiment/truth_match.h"
@@ -271,6 +272,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   internal::CheckStreams(root, full_problem, streams);
   experiment.out_of_sequence.ranks = RanksOf(streams, full_problem);
   experiment.segments = ReadSegments(root, full_problem, streams);
+  experiment.report_rows = internal::ReadReportRows(root, full_problem, experiment.segments);
   constexpr const char* kEstimators = "ekf: {type: ekf}";
   const Node estimators = root.At("estimators", "a run", "estimators: {ekf: {type: ekf}}");
   estimators.ExpectMap(kEstimators);

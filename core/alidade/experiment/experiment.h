@@ -84,8 +84,9 @@ struct Experiment {
   std::uint64_t seed = 1;
   OutOfSequencePolicy out_of_sequence;
   int reference = -1;  ///< index of the estimator that is the reference of the metrics; -1: truth
-  const Filter* guide = nullptr;     ///< filter that guides the source; null without a guide
-  std::vector<double> truth_sigmas;  ///< sigma of each truth; if empty, the source defines them
+  const Filter* guide = nullptr;         ///< filter that guides the source; null without a guide
+  std::vector<std::string> report_rows;  ///< `report.rows`: keys of the main rows, see MetricKey
+  std::vector<double> truth_sigmas;      ///< sigma of each truth; if empty, the source defines them
 };
 
 /// Returns the files and folders under `plugins:`, resolved against the folder of the config.

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <optional>
-#include <set>
 #include <string_view>
 #include <tuple>
 #include <utility>
@@ -43,28 +43,32 @@ std::vector<std::string> Keys(const RunResult& result, const Map EstimatorResult
   return keys;
 }
 
-/// Unit with an SI prefix that suits the magnitude of the numbers, and the factor that converts the
-/// numbers to this unit.
+/// Unit for a person, and the factor that converts numbers in SI to it.
 struct ScaledUnit {
   double factor = 1.0;
   std::string unit;
 };
 
+/// Chooses the unit for a person: degrees for angles, and for lengths and times the SI prefix that
+/// suits the largest number. Files contain SI units.
 ScaledUnit ScaleUnit(const std::string& unit, double largest) {
-  const std::string_view base = std::string_view(unit).substr(0, unit.find('/'));
-  const bool allows_prefix = base == "m" || base == "s" || base == "rad";
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  const std::size_t end = std::min(unit.find('/'), unit.size());
+  const std::string base = unit.substr(0, end);
+  if (base == "rad") return {kDegrees, "deg" + unit.substr(end)};
+  const bool allows_prefix = base == "m" || base == "s";
   if (!allows_prefix || !(largest > 0.0) || largest >= 1.0) return {1.0, unit};
   return largest >= 1e-3 ? ScaledUnit{1e3, 'm' + unit} : ScaledUnit{1e6, 'u' + unit};
 }
 
 using Values = std::vector<std::optional<double>>;
 
-/// Returns cells with at least four significant digits and all digits before the decimal point.
-/// Uses scientific notation for magnitudes of at most 1e-5 or at least 1e7.
+/// Returns cells with three significant digits and all digits before the decimal point. Uses
+/// scientific notation for magnitudes of at most 1e-5 or at least 1e7.
 std::vector<std::string> Format(const Values& values) {
   constexpr double kSmall = 1e-5, kLarge = 1e7;
-  const auto decimals = [](double v) {
-    return std::clamp(3 - static_cast<int>(std::floor(std::log10(v))), 0, 9);
+  const auto decimals = [](double v) {  // 9.995 and above are rounded to 10.0
+    return std::clamp(2 - static_cast<int>(std::floor(std::log10(v / 0.9995))), 0, 9);
   };
   std::vector<std::string> cells;
   for (const auto& value : values) {
@@ -77,7 +81,7 @@ std::vector<std::string> Format(const Values& values) {
     } else if (std::abs(*value) < kLarge && std::abs(*value) > kSmall) {
       cells.push_back(FixedText(*value, decimals(std::abs(*value))));
     } else {
-      cells.push_back(ScientificText(*value, 3));
+      cells.push_back(ScientificText(*value, 2));
     }
   }
   return cells;
@@ -154,9 +158,21 @@ TableRow RowOf(const RunResult& result, const std::string& text, const std::stri
   return {label, Format(values)};
 }
 
-/// Returns the name of a metric for a table. Omits the unit, because the label contains it in
-/// brackets.
-std::string ShownName(const std::string& name) { return name == "lag_ms" ? "lag" : name; }
+/// Returns the name of a metric or count for a person.
+std::string ShownName(const std::string& name) {
+  constexpr std::pair<std::string_view, const char*> kNames[] = {
+      {"lag_ms", "lag"},
+      {"nees.mean", "NEES"},
+      {"nees.within95", "NEES inside 95 % region"},
+      {"nis.mean", "NIS"},
+      {"nis.all", "NIS with rejected"},
+      {"coverage95", "inside 95 % region"},
+      {"final_error", "final error"},
+  };
+  const auto* const found =
+      std::ranges::find(kNames, name, [](const auto& pair) { return pair.first; });
+  return found == std::end(kNames) ? name : found->second;
+}
 
 /// Returns true if the errors of the subject are zero in every estimator, for example because a
 /// block is fixed at its true value.
@@ -178,83 +194,116 @@ bool IsShown(const RunResult& result, const MetricKey& key) {
   return key.segment.empty() ? metric->is_shown : metric->is_shown_by_segment;
 }
 
-/// Returns the rows of the shown metrics and of the counts whose keys satisfy `is_included`.
-template <class Predicate>
-std::vector<TableRow> SelectRows(const RunResult& result, const Predicate& is_included) {
-  std::vector<TableRow> rows;
-  for (const std::string& text : OrderedMetrics(result)) {
-    const MetricKey key = MetricKey::Parse(text);
-    if (!IsShown(result, key) || !is_included(text)) continue;
-    rows.push_back(RowOf(result, text, ShownName(key.name)));
-  }
-  for (const std::string& text : OrderedCounts(result)) {
-    if (!is_included(text)) continue;
-    const MetricKey key = MetricKey::Parse(text);
-    TableRow row{key.name + (key.subject.empty() ? "" : ' ' + key.subject), {}};
-    for (const EstimatorResult& estimator : result.estimators) {
-      const auto count = estimator.counts.find(text);
-      row.cells.push_back(count == estimator.counts.end() ? "-" : std::to_string(count->second));
-    }
-    rows.push_back(std::move(row));
-  }
-  return rows;
+/// Formats a count with separators of thousands: `12,345`.
+std::string CountText(std::int64_t count) {
+  std::string text = std::to_string(count);
+  for (std::size_t i = text.size(); i > 3; i -= 3) text.insert(i - 3, ",");
+  return text;
 }
 
-/// Adds the row of the verdicts before the other rows.
-void AddVerdictRow(const RunResult& result, std::vector<TableRow>& rows) {
+TableRow CountRow(const RunResult& result, const std::string& text) {
+  const MetricKey key = MetricKey::Parse(text);
+  TableRow row{key.name + (key.subject.empty() ? "" : ' ' + key.subject), {}};
+  for (const EstimatorResult& estimator : result.estimators) {
+    const auto count = estimator.counts.find(text);
+    row.cells.push_back(count == estimator.counts.end() ? "-" : CountText(count->second));
+  }
+  return row;
+}
+
+/// Returns the row with the numbers of used and of all measurements of a sensor.
+TableRow UsedRow(const RunResult& result, const std::string& sensor) {
+  TableRow row{"used / given " + sensor, {}};
+  for (const EstimatorResult& estimator : result.estimators) {
+    std::int64_t used = 0, given = 0;
+    for (const OutcomeInfo& outcome : kOutcomes) {
+      const auto count = estimator.counts.find(MetricKey{outcome.name, sensor, ""}.text());
+      if (count == estimator.counts.end()) continue;
+      given += count->second;
+      if (outcome.is_used) used += count->second;
+    }
+    row.cells.push_back(given == 0 ? "-" : CountText(used) + '/' + CountText(given));
+  }
+  return row;
+}
+
+/// Returns true if the verdict is bad, and a mean NEES or NIS is outside its 95 % bounds.
+bool IsAlarm(const EstimatorResult& estimator, const MetricKey& key) {
+  if (estimator.verdict.state >= VerdictState::kNotTested || !key.name.ends_with(".mean")) {
+    return false;
+  }
+  const std::string kind = key.name.substr(0, key.name.find('.'));
+  const auto value = [&](const std::string& name) {
+    const auto found = estimator.metrics.find(MetricKey{name, key.subject, key.segment}.text());
+    return found == estimator.metrics.end() ? 1.0 : found->second;
+  };
+  return value(key.name) < value(kind + ".low") || value(key.name) > value(kind + ".high");
+}
+
+/// Returns the row of a metric for the table of a run. Marks alarms by ` !`.
+TableRow MarkedRow(const RunResult& result, const std::string& text) {
+  const MetricKey key = MetricKey::Parse(text);
+  TableRow row = RowOf(result, text, ShownName(key.name));
+  for (std::size_t e = 0; e < row.cells.size(); ++e) {
+    if (IsAlarm(result.estimators[e], key)) row.cells[e] += " !";
+  }
+  return row;
+}
+
+TableRow VerdictRow(const RunResult& result) {
   TableRow verdict{"verdict", {}};
   for (const EstimatorResult& estimator : result.estimators) {
     verdict.cells.emplace_back(ToString(estimator.verdict.state));
   }
-  rows.insert(rows.begin(), std::move(verdict));
+  return verdict;
 }
 
-constexpr std::size_t kMainRows = 10;
+bool IsAccepted(const MetricKey& key) { return key.name == ToString(Outcome::kAccepted); }
 
-/// Returns the priority of a metric or count in MainRows(); 0 if it is never a main row.
-int PriorityOf(const MetricKey& key) {
+/// Returns the row of a key of MainKeys().
+TableRow MainRow(const RunResult& result, const std::string& text) {
+  const MetricKey key = MetricKey::Parse(text);
+  if (IsAccepted(key)) return UsedRow(result, key.subject);
+  const std::vector<std::string> counts = Keys(result, &EstimatorResult::counts);
+  const bool is_count = std::ranges::binary_search(counts, text);
+  return is_count ? CountRow(result, text) : MarkedRow(result, text);
+}
+
+/// Returns true if the key is the error of a block that belongs to a sensor, such as a clock
+/// offset.
+bool IsOfSensor(const RunResult& result, const MetricKey& key) {
+  const std::string owner = key.subject.substr(0, key.subject.find('.'));
+  const auto has_sensor = [&](const EstimatorResult& estimator) {
+    return std::ranges::count(estimator.sensors, owner) > 0;
+  };
+  return key.subject.size() > owner.size() && std::ranges::any_of(result.estimators, has_sensor);
+}
+
+constexpr int kErrorPriority = 1;  ///< priority of rmse in kMetrics
+
+/// Returns the relevance of a metric or count, from 1; 0 if it is not relevant. The error of a
+/// block of a sensor is its error at the end.
+int PriorityOf(const RunResult& result, const MetricKey& key) {
   constexpr int kAcceptedPriority = 4;
   if (!key.segment.empty()) return 0;
-  if (key.name == ToString(Outcome::kAccepted)) return kAcceptedPriority;
+  if (IsAccepted(key)) return kAcceptedPriority;
+  if (IsOfSensor(result, key)) return key.name == "final_error" ? kErrorPriority : 0;
   const MetricInfo* const metric = FindMetric(key.name);
-  return metric == nullptr ? 0 : metric->priority;
+  return metric == nullptr || !IsShown(result, key) ? 0 : metric->priority;
 }
 
-/// Returns the keys of MainRows() without the verdict. Each round chooses one
-/// subject of each metric.
-std::set<std::string> MainKeys(const RunResult& result, const std::vector<std::string>& subjects) {
-  // Each pair consists of the index of a subject and a key.
-  std::map<int, std::vector<std::pair<std::size_t, std::string>>> by_priority;
-  const auto add = [&](const std::vector<std::string>& candidates, bool is_count) {
-    for (const std::string& text : candidates) {
-      const MetricKey key = MetricKey::Parse(text);
-      const int priority = PriorityOf(key);
-      if (priority == 0 || (!is_count && !IsShown(result, key))) continue;
-      const auto position = std::find(subjects.begin(), subjects.end(), key.subject);
-      by_priority[priority].emplace_back(position - subjects.begin(), text);
-    }
-  };
-  add(Keys(result, &EstimatorResult::metrics), false);
-  add(Keys(result, &EstimatorResult::counts), true);
-  std::vector<std::tuple<std::size_t, int, std::string>> ranked;  // round, priority, key
-  for (auto& [priority, keys] : by_priority) {
-    std::sort(keys.begin(), keys.end());
-    for (std::size_t round = 0; round < keys.size(); ++round) {
-      ranked.emplace_back(round, priority, keys[round].second);
-    }
-  }
-  std::sort(ranked.begin(), ranked.end());
-  std::set<std::string> chosen;
-  for (std::size_t i = 0; i < std::min(ranked.size(), kMainRows - 1); ++i) {
-    chosen.insert(std::get<2>(ranked[i]));
-  }
-  return chosen;
-}
-
-std::string TableOf(const RunResult& result, const std::vector<TableRow>& rows) {
+std::string ReferenceLine(const RunResult& result) {
   const std::string reference = ReferenceText(result);
-  return FormatTable(MakeTable(NamesOf(result.estimators), rows), TableFormat::kText) +
-         (reference.empty() ? "" : '\n' + reference + '\n');
+  return reference.empty() ? "" : '\n' + reference + '\n';
+}
+
+/// Formats a table with the estimators as columns. If it is wider than a line and shorter with the
+/// estimators as rows, exchanges rows and columns.
+std::string FittedTable(const Table& table, std::size_t width) {
+  const std::string columns = FormatTable(table, TableFormat::kText, width);
+  if (columns.find("\n\n") == columns.npos) return columns;
+  const std::string rows = FormatTable(Transposed(table), TableFormat::kText, width);
+  return std::ranges::count(rows, '\n') < std::ranges::count(columns, '\n') ? rows : columns;
 }
 
 }  // namespace
@@ -274,8 +323,18 @@ std::vector<std::string> OrderedCounts(const RunResult& result) {
   return keys;
 }
 
+std::vector<std::string> ShownMetrics(const RunResult& result) {
+  std::vector<std::string> keys = OrderedMetrics(result);
+  std::erase_if(keys, [&](const auto& text) { return !IsShown(result, MetricKey::Parse(text)); });
+  return keys;
+}
+
 std::vector<TableRow> MetricRows(const RunResult& result) {
-  return SelectRows(result, [](const std::string&) { return true; });
+  std::vector<TableRow> rows;
+  for (const std::string& text : ShownMetrics(result)) {
+    rows.push_back(RowOf(result, text, ShownName(MetricKey::Parse(text).name)));
+  }
+  return rows;
 }
 
 std::vector<TableRow> RowsOf(const RunResult& result, const std::string& name,
@@ -290,8 +349,9 @@ std::vector<TableRow> RowsOf(const RunResult& result, const std::string& name,
 }
 
 std::vector<TableRow> ComparisonRows(const RunResult& result) {
-  std::vector<TableRow> rows = MetricRows(result);
-  AddVerdictRow(result, rows);
+  std::vector<TableRow> rows = {VerdictRow(result)};
+  for (const std::string& text : ShownMetrics(result)) rows.push_back(MarkedRow(result, text));
+  for (const std::string& text : OrderedCounts(result)) rows.push_back(CountRow(result, text));
   return rows;
 }
 
@@ -310,21 +370,47 @@ std::vector<std::string> SubjectsOf(const Experiment& experiment) {
   return subjects;
 }
 
-std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::string>& subjects) {
-  std::vector<TableRow> all_rows = ComparisonRows(result);
-  if (all_rows.size() <= kMainRows) return all_rows;
-  const std::set<std::string> keys = MainKeys(result, subjects);
-  std::vector<TableRow> rows =
-      SelectRows(result, [&](const std::string& key) { return keys.contains(key); });
-  AddVerdictRow(result, rows);
-  return rows;
+std::vector<std::string> MainKeys(const RunResult& result,
+                                  const std::vector<std::string>& subjects) {
+  constexpr std::size_t kMainRows = 9, kErrors = 4, kOthers = 2;
+  std::vector<std::string> keys = Keys(result, &EstimatorResult::metrics);
+  const std::vector<std::string> counted = Keys(result, &EstimatorResult::counts);
+  keys.insert(keys.end(), counted.begin(), counted.end());
+  std::map<std::pair<int, std::ptrdiff_t>, std::vector<std::string>> by_relevance;
+  for (const std::string& text : keys) {
+    const MetricKey key = MetricKey::Parse(text);
+    const auto position = std::ranges::find(subjects, key.subject) - subjects.begin();
+    const int priority = PriorityOf(result, key);
+    if (priority > 0) by_relevance[{priority, position}].push_back(text);
+  }
+  std::map<int, std::size_t> counts;  // number of keys of each priority
+  std::vector<std::string> first, later;
+  for (const auto& [relevance, same] : by_relevance) {
+    for (const std::string& text : same) {
+      const std::size_t limit = relevance.first == kErrorPriority ? kErrors : kOthers;
+      (counts[relevance.first]++ < limit ? first : later).push_back(text);
+    }
+  }
+  first.insert(first.end(), later.begin(), later.end());
+  if (first.size() > kMainRows) first.resize(kMainRows);
+  return first;
 }
 
-std::string MainTable(const RunResult& result, const std::vector<std::string>& subjects) {
-  const std::vector<TableRow> rows = MainRows(result, subjects);
-  const std::size_t omitted = ComparisonRows(result).size() - rows.size();
-  return TableOf(result, rows) +
-         (omitted > 0 ? '\n' + std::to_string(omitted) + " more rows: --all\n" : "");
+std::string MainTable(const RunResult& result, const std::vector<std::string>& keys,
+                      std::size_t width, std::size_t max_lines) {
+  std::vector<TableRow> rows = {VerdictRow(result)};
+  for (const std::string& text : keys) rows.push_back(MainRow(result, text));
+  const std::size_t all_rows = ComparisonRows(result).size();
+  while (true) {
+    const std::string table =
+        FittedTable(MakeTable(NamesOf(result.estimators), rows), width) + ReferenceLine(result) +
+        (all_rows > rows.size()
+             ? '\n' + std::to_string(all_rows - rows.size()) + " more rows: --all\n"
+             : "");
+    const auto lines = static_cast<std::size_t>(std::ranges::count(table, '\n'));
+    if (lines <= max_lines || rows.size() <= 2) return table;
+    rows.pop_back();
+  }
 }
 
 std::string ValueText(const std::string& key, double value, const std::string& unit) {
@@ -411,8 +497,11 @@ std::string VerdictText(const RunResult& result) {
   return text;
 }
 
-std::string ComparisonTable(const RunResult& result) {
-  return internal::TableOf(result, internal::ComparisonRows(result));
+std::string ComparisonTable(const RunResult& result, std::size_t width) {
+  return FormatTable(internal::MakeTable(internal::NamesOf(result.estimators),
+                                         internal::ComparisonRows(result)),
+                     internal::TableFormat::kText, width) +
+         internal::ReferenceLine(result);
 }
 
 }  // namespace alidade

@@ -15,20 +15,27 @@ std::vector<std::string> OrderedMetrics(const RunResult& result);
 /// Returns the keys of all counts. The counts of accepted measurements come first.
 std::vector<std::string> OrderedCounts(const RunResult& result);
 
-/// Returns the rows of the metrics that tables show, and of all counts.
+/// Returns the keys of the metrics that tables show.
+std::vector<std::string> ShownMetrics(const RunResult& result);
+/// Returns the rows of ShownMetrics().
 std::vector<TableRow> MetricRows(const RunResult& result);
-/// Returns the row `verdict` and MetricRows().
+/// Returns the row `verdict`, MetricRows() and the rows of all counts. If the verdict on an
+/// estimator is bad, ` !` marks each mean NEES and NIS outside its bounds.
 std::vector<TableRow> ComparisonRows(const RunResult& result);
 /// Returns the subjects of rows in the order of the config: the blocks, their owners and the
 /// sensors of each estimator.
 std::vector<std::string> SubjectsOf(const Experiment& experiment);
-/// Returns ComparisonRows() if they are at most ten rows. Otherwise returns `verdict` and nine
-/// other rows in the same order, without rows of segments. The selection proceeds in rounds. Each
-/// round chooses one subject of each metric, in the order of priority; subjects that `subjects`
-/// does not contain come last.
-std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::string>& subjects);
-/// Returns the table of MainRows(), with the number of omitted rows.
-std::string MainTable(const RunResult& result, const std::vector<std::string>& subjects);
+/// Returns the keys of the metrics and counts that are most relevant to a run, at most nine:
+/// errors, NEES, NIS, measurements, and the others by MetricInfo::priority. The first four errors,
+/// and the first two subjects of each other metric, come before all later subjects. `subjects`
+/// contains the subjects in order.
+std::vector<std::string> MainKeys(const RunResult& result,
+                                  const std::vector<std::string>& subjects);
+/// Returns the table of the verdicts and of these keys, in this order. The estimators are columns
+/// or rows. Omits the last keys if the table has more lines than `max_lines`. The key of accepted
+/// measurements yields the row `used / given`. The last line contains the number of omitted rows.
+std::string MainTable(const RunResult& result, const std::vector<std::string>& keys,
+                      std::size_t width, std::size_t max_lines);
 /// Returns the rows of the metrics with this name over the whole run. Replaces the name by `label`.
 std::vector<TableRow> RowsOf(const RunResult& result, const std::string& name,
                              const std::string& label);

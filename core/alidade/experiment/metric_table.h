@@ -82,7 +82,7 @@ struct MetricInfo {
 
   bool is_shown = false;             ///< true if the tables of `run` and `sweep` show the metric
   bool is_shown_by_segment = false;  ///< true if these tables also show each segment
-  int priority = 0;  ///< order among the ten main rows of `run`, from 1; 0: not a main row
+  int priority = 0;                  ///< relevance for the table of `run`, from 1; 0: not relevant
 
   MetricSection section = MetricSection::kNone;
   const char* label = "";  ///< name of the metric in a comparison
@@ -196,7 +196,7 @@ inline constexpr std::array kMetrics = {
                .has_segments = true,
                .is_shown = true,
                .is_shown_by_segment = true,
-               .priority = 5},
+               .priority = 8},
     MetricInfo{
         .name = "nees.mean",
         .meaning = "mean of e' C^-1 e / dof; e contains the errors of all estimated blocks of "
@@ -342,7 +342,7 @@ inline constexpr std::array kMetrics = {
                .unit = MetricUnit::kMetre,
                .goal = MetricGoal::kZero,
                .is_shown = true,
-               .priority = 6,
+               .priority = 5,
                .section = MetricSection::kFinal,
                .label = "map",
                .is_main = true,
@@ -354,7 +354,7 @@ inline constexpr std::array kMetrics = {
                .unit = MetricUnit::kMetre,
                .goal = MetricGoal::kZero,
                .is_shown = true,
-               .priority = 7,
+               .priority = 9,
                .section = MetricSection::kFinal,
                .label = "Sim3-aligned map",
                .is_main = true,
@@ -396,7 +396,7 @@ inline constexpr std::array kMetrics = {
                .goal = MetricGoal::kZero,
                .needs_truth = false,
                .is_shown = true,
-               .priority = 8},
+               .priority = 7},
     MetricInfo{.name = "settling_frames",
                .meaning = "number, counted from 1, of the frame from which the centred rms over at "
                           "most 9 frames stays within 20 % of `reprojection`; infinite if the "
@@ -405,7 +405,8 @@ inline constexpr std::array kMetrics = {
                .unit = MetricUnit::kFrames,
                .goal = MetricGoal::kZero,
                .needs_truth = false,
-               .is_shown = true},
+               .is_shown = true,
+               .priority = 6},
 };
 
 /// Returns the entry of a metric; null if no metric has that name.

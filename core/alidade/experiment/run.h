@@ -11,6 +11,7 @@
 
 #include "alidade/experiment/experiment.h"
 #include "alidade/experiment/verdict.h"
+#include "alidade/io/wrap_text.h"
 
 namespace alidade {
 
@@ -115,8 +116,9 @@ struct RunOptions {
 /// more than 1e-3 also ends the run. The result reports all errors; the function does not throw.
 RunResult Run(Experiment& experiment, const RunOptions& options);
 
-/// Returns a table of the main metrics for a terminal, with one column for each estimator. If the
-/// reference is not truth, a line below the table names the reference.
-std::string ComparisonTable(const RunResult& result);
+/// Returns a table of the main metrics for a terminal of this width, with one column for each
+/// estimator. If the reference is not truth, a line below the table names the reference.
+std::string ComparisonTable(const RunResult& result,
+                            std::size_t width = internal::kDefaultTextWidth);
 
 }  // namespace alidade

@@ -2,9 +2,12 @@
 #include "alidade/io/text_table.h"
 
 #include <algorithm>
+#include <span>
 #include <string_view>
+#include <utility>
 
 #include "alidade/base/text.h"
+#include "alidade/io/utf8.h"
 
 namespace alidade::internal {
 namespace {
@@ -46,31 +49,131 @@ std::string LatexTable(const Table& table) {
   return text + "\\hline\n\\end{tabular}\n";
 }
 
-std::string PlainTable(const Table& table) {
-  constexpr std::size_t kLineWidth = 100, kGap = 2;
-  std::vector<std::size_t> widths;
-  for (const std::string& name : table.header) widths.push_back(name.size());
-  for (const TextRow& row : table.rows) {
-    for (std::size_t c = 0; c < widths.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
+constexpr std::size_t kGap = 2;
+
+std::vector<std::string> LinesOf(const std::string& text) {
+  std::vector<std::string> lines(1);
+  for (const char c : text) {
+    if (c == '\n') {
+      lines.emplace_back();
+    } else {
+      lines.back() += c;
+    }
   }
+  return lines;
+}
+
+std::size_t WidestWord(const std::string& text) {
+  std::string words = text;
+  std::ranges::replace(words, ' ', '\n');
+  return std::ranges::max(LinesOf(words), {}, TextWidth).size();
+}
+
+std::string ReplaceAll(std::string text, std::string_view old, std::string_view replacement) {
+  for (std::size_t i = 0; (i = text.find(old, i)) != text.npos; i += replacement.size()) {
+    text.replace(i, old.size(), replacement);
+  }
+  return text;
+}
+
+/// Column of numbers. Its header may be wrapped, also after the point of a name. The decimal
+/// points of its cells are below each other.
+class Column {
+ public:
+  Column(const Table& table, std::size_t index) {
+    for (const TextRow& row : table.rows) {
+      const std::string& cell = row[index];
+      const std::size_t whole = WholeWidth(cell);
+      whole_ = std::max(whole_, whole);
+      if (whole > 0) fraction_ = std::max(fraction_, TextWidth(cell) - whole);
+      width_ = std::max(width_, TextWidth(cell));
+    }
+    const std::string header = ReplaceAll(table.header[index], ".", ". ");
+    width_ = std::max({width_, whole_ + fraction_, WidestWord(header)});
+    header_ = LinesOf(WrapText(header, width_, 0));
+    for (std::string& line : header_) line = ReplaceAll(line, ". ", ".");
+  }
+  std::size_t width() const { return width_; }
+  const std::vector<std::string>& header() const { return header_; }
+  /// Returns the text of a cell with blanks on both sides.
+  std::string Cell(const std::string& cell) const {
+    const std::size_t whole = WholeWidth(cell);
+    const std::size_t after = whole == 0 ? 0 : fraction_ - (TextWidth(cell) - whole);
+    return std::string(width_ - after - TextWidth(cell), ' ') + cell + std::string(after, ' ');
+  }
+
+ private:
+  /// Returns the number of characters before the decimal point, or 0 if the cell is not a number.
+  static std::size_t WholeWidth(const std::string& cell) {
+    if (cell == "-") return 1;
+    const std::size_t digit = cell.starts_with('-') ? 1 : 0;
+    const bool is_number = digit < cell.size() && cell[digit] >= '0' && cell[digit] <= '9';
+    return is_number ? std::min(cell.find_first_not_of("0123456789,/", digit), cell.size()) : 0;
+  }
+
+  std::size_t whole_ = 0, fraction_ = 0, width_ = 0;
+  std::vector<std::string> header_;
+};
+
+void AppendLine(std::string line, std::string& text) {
+  line.erase(line.find_last_not_of(' ') + 1);
+  text += line + '\n';
+}
+
+/// Appends the lines of a row: the label, which may have several lines, and the cells in the first.
+void AppendRow(const std::string& label, std::size_t label_width, const std::string& cells,
+               std::string& text) {
+  const std::vector<std::string> lines = LinesOf(WrapText(label, label_width));
+  AppendLine(
+      lines[0] + std::string(label_width - std::min(label_width, TextWidth(lines[0])), ' ') + cells,
+      text);
+  for (std::size_t i = 1; i < lines.size(); ++i) AppendLine(lines[i], text);
+}
+
+/// Appends the header of the columns [first, end). The last lines of all headers are side by side.
+void AppendHeader(const std::string& corner, std::size_t label_width,
+                  std::span<const Column> columns, std::string& text) {
+  std::size_t height = 1;
+  for (const Column& column : columns) height = std::max(height, column.header().size());
+  for (std::size_t i = 0; i < height; ++i) {
+    std::string cells;
+    for (const Column& column : columns) {
+      const std::size_t missing = height - column.header().size();
+      const std::string line = i < missing ? "" : column.header()[i - missing];
+      cells += std::string(kGap + column.width() - TextWidth(line), ' ') + line;
+    }
+    AppendRow(i + 1 < height ? "" : corner, label_width, cells, text);
+  }
+}
+
+std::string PlainTable(const Table& table, std::size_t line_width) {
+  std::vector<Column> columns;
+  std::size_t label_width = TextWidth(table.header[0]), widest = 0;
+  for (std::size_t c = 1; c < table.header.size(); ++c) {
+    columns.emplace_back(table, c);
+    widest = std::max(widest, kGap + columns.back().width());
+  }
+  for (const TextRow& row : table.rows) label_width = std::max(label_width, TextWidth(row[0]));
+  constexpr std::size_t kNarrowest = 12;
+  const std::size_t remaining = line_width > widest ? line_width - widest : 0;
+  label_width = std::min(label_width, std::max(remaining, kNarrowest));
   std::string text;
-  const auto append_line = [&](const TextRow& row, std::size_t first, std::size_t end) {
-    text += row[0];
-    text.append(widths[0] - row[0].size(), ' ');
-    for (std::size_t c = first; c < end; ++c) {
-      text.append(kGap + widths[c] - row[c].size(), ' ').append(row[c]);
+  for (std::size_t first = 0, end = 0; first < columns.size(); first = end) {
+    std::size_t width = label_width;
+    for (end = first; end < columns.size(); ++end) {
+      width += kGap + columns[end].width();
+      if (width > line_width && end > first) break;
     }
-    text += '\n';
-  };
-  for (std::size_t first = 1, end = 1; first < widths.size(); first = end) {
-    std::size_t width = widths[0];
-    for (end = first; end < widths.size(); ++end) {
-      width += kGap + widths[end];
-      if (width > kLineWidth && end > first) break;
+    if (first > 0) text += '\n';
+    AppendHeader(table.header[0], label_width, std::span(columns).subspan(first, end - first),
+                 text);
+    for (const TextRow& row : table.rows) {
+      std::string cells;
+      for (std::size_t c = first; c < end; ++c) {
+        cells += std::string(kGap, ' ') + columns[c].Cell(row[c + 1]);
+      }
+      AppendRow(row[0], label_width, cells, text);
     }
-    if (first > 1) text += '\n';
-    append_line(table.header, first, end);
-    for (const TextRow& row : table.rows) append_line(row, first, end);
   }
   return text;
 }
@@ -129,7 +232,21 @@ Table MakeTable(const std::vector<std::string>& names, const std::vector<TableRo
   return table;
 }
 
-std::string FormatTable(const Table& table, TableFormat format) {
+Table Transposed(const Table& table) {
+  Table transposed;
+  for (std::size_t c = 0; c < table.header.size(); ++c) {
+    TextRow row = {table.header[c]};
+    for (const TextRow& source : table.rows) row.push_back(source[c]);
+    if (c == 0) {
+      transposed.header = std::move(row);
+    } else {
+      transposed.rows.push_back(std::move(row));
+    }
+  }
+  return transposed;
+}
+
+std::string FormatTable(const Table& table, TableFormat format, std::size_t width) {
   switch (format) {
     case TableFormat::kMarkdown:
       return MarkdownTable(table);
@@ -138,7 +255,7 @@ std::string FormatTable(const Table& table, TableFormat format) {
     case TableFormat::kText:
       break;
   }
-  return PlainTable(table);
+  return PlainTable(table, width);
 }
 
 }  // namespace alidade::internal

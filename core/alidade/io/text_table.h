@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/io/wrap_text.h"
+
 namespace alidade::internal {
 
 using TextRow = std::vector<std::string>;
@@ -28,13 +30,20 @@ struct Table {
 /// `names`.
 Table MakeTable(const std::vector<std::string>& names, const std::vector<TableRow>& rows,
                 const std::string& corner = "");
+/// Returns the table with rows and columns exchanged.
+Table Transposed(const Table& table);
 
 enum class TableFormat {
-  kText,      ///< only the first column is left-aligned; a wide table is split into several parts
+  kText,      ///< numbers are aligned at the decimal point
   kMarkdown,  ///< special characters are escaped
   kLatex,     ///< a `tabular` environment, which needs no package; special characters are escaped
 };
-std::string FormatTable(const Table& table, TableFormat format);
+/// Formats a table. `width` is the width of lines for kText. If the table is wider, it is split
+/// into
+/// parts, and labels are wrapped if one column needs this. Headers that are wider than the cells
+/// are always wrapped.
+std::string FormatTable(const Table& table, TableFormat format,
+                        std::size_t width = kDefaultTextWidth);
 
 /// Returns `text` with LaTeX's special characters escaped.
 std::string LatexText(const std::string& text);

@@ -46,6 +46,12 @@ inline bool IsControl(std::string_view text) {
   return byte(0) < ' ' || byte(0) == 0x7F || (byte(0) == 0xC2 && byte(1) < 0xA0);
 }
 
+/// Returns the number of characters of a text in UTF-8, which is its width on a terminal.
+inline std::size_t TextWidth(std::string_view text) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(text, [](char c) { return (c & 0xC0) != 0x80; }));
+}
+
 /// Returns `text` in printable form. Replaces each invalid byte by `?`, and each control character
 /// unless `allowed_controls` contains it.
 inline std::string PrintableUtf8(std::string_view text, std::string_view allowed_controls) {

@@ -2,6 +2,7 @@
 #include "alidade/check/check.h"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <utility>
 
@@ -161,13 +162,21 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
 std::string CheckText(const PluginEntry& entry, const std::vector<CheckResult>& findings) {
   constexpr const char* kWords[] = {"ok", "FAIL", "skipped"};
   std::vector<internal::TextRow> rows;
+  std::array<int, std::size(kWords)> counts{};
   for (const CheckResult& finding : findings) {
+    ++counts[static_cast<std::size_t>(finding.verdict)];
     std::string text = finding.text;
     std::replace(text.begin(), text.end(), '\n', ' ');
     rows.push_back({kWords[static_cast<int>(finding.verdict)], finding.check, text});
   }
+  const auto count = [&](CheckResult::Verdict verdict, const char* word) {
+    return std::to_string(counts[static_cast<std::size_t>(verdict)]) + word;
+  };
   return entry.name + " (" + entry.kind + " of " + entry.plugin.string() + ")\n" +
-         internal::TextTable(rows, 2);
+         internal::TextTable(rows, 2) + std::to_string(findings.size()) +
+         " checks: " + count(CheckResult::Verdict::kOk, " ok, ") +
+         count(CheckResult::Verdict::kFail, " failed, ") +
+         count(CheckResult::Verdict::kSkipped, " skipped\n");
 }
 
 bool AnyFailure(const std::vector<CheckResult>& findings) {

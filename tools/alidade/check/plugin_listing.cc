@@ -121,18 +121,22 @@ Json JsonOf(const std::vector<ParamInfo>& schema) {
 }  // namespace
 
 std::string PluginList(const PluginHost& host, bool files) {
-  std::vector<TextRow> rows = {{"name", "kind", "description", "file"}};
-  for (const PluginEntry* entry : Sorted(host)) {
-    rows.push_back({entry->name, entry->kind, entry->doc, entry->plugin.string()});
-  }
-  const std::string suffix = rows.size() > 1 ? "" : "\nno plugins found\n";
-  for (const EstimatorType& type : EstimatorTypes()) {
-    rows.push_back({type.name, kEstimatorKind, type.doc, "built in"});
-  }
-  for (TextRow& row : rows) {
+  const std::vector<const PluginEntry*> entries = Sorted(host);
+  std::vector<TextRow> rows;
+  std::string kind;
+  const auto add = [&](const std::string& row_kind, TextRow row) {
+    if (row_kind != kind) rows.push_back({(rows.empty() ? "" : "\n") + row_kind + 's'});
+    kind = row_kind;
     if (!files) row.pop_back();
+    rows.push_back(std::move(row));
+  };
+  for (const PluginEntry* entry : entries) {
+    add(entry->kind, {"  " + entry->name, entry->doc, entry->plugin.string()});
   }
-  return TextTable(rows) + suffix;
+  for (const EstimatorType& type : EstimatorTypes()) {
+    add(kEstimatorKind, {std::string("  ") + type.name, type.doc, "built in"});
+  }
+  return TextTable(rows) + (entries.empty() ? "\nno plugins found\n" : "");
 }
 
 std::string PluginListJson(const PluginHost& host) {

@@ -202,9 +202,10 @@ enum class TableStyle { kText, kMarkdown, kLatex };
 /// errors, ratios of errors, NEES and the wall-clock time. Without truth, differences replace
 /// errors.
 enum class ReportRows { kAll, kMain };
-/// Formats the tables and the error decomposition.
+/// Formats the tables and the error decomposition. `width` is the width of lines for kText.
 std::string CompareReport(const Comparison& comparison, TableStyle style,
-                          ReportRows rows = ReportRows::kAll);
+                          ReportRows rows = ReportRows::kAll,
+                          std::size_t width = internal::kDefaultTextWidth);
 /// Formats all values as JSON (docs/compare.md).
 std::string CompareJson(const Comparison& comparison);
 

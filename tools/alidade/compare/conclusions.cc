@@ -186,11 +186,13 @@ std::vector<SweepSummary> SummariesOf(const Comparison& comparison) {
 
 }  // namespace
 
-std::string RatioText(const Ratio& ratio) {
+std::string RatioText(const Ratio& ratio, bool with_interval) {
   const auto text = [](double value) { return FixedText(value, value < 10.0 ? 4 : 1); };
   if (!ratio.interval || ratio.error == ratio.reference_error) return CellOf(ratio.value());
-  return text(ratio.value()) + " [" + text(ratio.interval->low) + ", " +
-         text(ratio.interval->high) + ']' +
+  const Interval& interval = *ratio.interval;
+  return text(ratio.value()) +
+         (with_interval ? " [" + text(interval.low) + ", " + text(interval.high) + ']'
+                        : " +- " + RoundedText(0.5 * (interval.high - interval.low), 2)) +
          (ratio.runs < kFewRuns ? " too few runs"
           : ratio.undecided()   ? " undecided"
                                 : "");

@@ -16,8 +16,9 @@ namespace alidade::internal {
 /// for ten runs.
 inline constexpr std::int64_t kFewRuns = 10;
 
-/// Formats a ratio with its interval, as in `1.0110 [0.9930, 1.0302] undecided`.
-std::string RatioText(const Ratio& ratio);
+/// Formats a ratio with its interval, as in `1.0110 [0.9930, 1.0302] undecided`, or with half of
+/// the width of its interval, as in `1.0110 +- 0.019 undecided`.
+std::string RatioText(const Ratio& ratio, bool with_interval = true);
 
 /// Returns the sentences about a comparison: one for each step of the decomposition, one about the
 /// least error and the least CPU time, and over several seeds ConsistencyOf().

@@ -42,7 +42,8 @@ struct Column {
 };
 
 /// Returns the rows with the ratios of a metric.
-std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKind& kind) {
+std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKind& kind,
+                                bool with_intervals) {
   std::map<std::string, TableRow> rows;  // key: key of the ratio
   for (const Column& column : columns) {
     for (const auto& [key, ratio] : column.ratios) {
@@ -55,16 +56,17 @@ std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKin
   for (auto& [key, row] : rows) {
     for (const Column& column : columns) {
       const auto found = column.ratios.find(key);
-      row.cells.push_back(found == column.ratios.end() ? "-" : RatioText(found->second));
+      row.cells.push_back(found == column.ratios.end() ? "-"
+                                                       : RatioText(found->second, with_intervals));
     }
     sorted_rows.push_back(std::move(row));
   }
   return sorted_rows;
 }
 
-/// Returns rows with the mean. For several runs, the rows also contain [p05, p95]. The three
-/// numbers are formatted as columns of one table, so all numbers of a row have the same unit.
-std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool several,
+/// Returns rows with the mean. If `with_intervals` is true, the rows also contain [p05, p95]. The
+/// three numbers are formatted as columns of one table, so all numbers of a row have the same unit.
+std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool with_intervals,
                                  const std::vector<RowKind>& kinds) {
   RunResult result;
   for (const Column& column : columns) {
@@ -77,7 +79,7 @@ std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool severa
   std::vector<TableRow> rows;
   for (const RowKind& kind : kinds) {
     if (kind.is_ratio) {
-      const std::vector<TableRow> ratios = RatioRows(columns, kind);
+      const std::vector<TableRow> ratios = RatioRows(columns, kind, with_intervals);
       rows.insert(rows.end(), ratios.begin(), ratios.end());
       continue;
     }
@@ -85,7 +87,7 @@ std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool severa
       std::vector<std::string> cells;
       for (std::size_t i = 0; i < row.cells.size(); i += 3) {
         const std::string* const c = &row.cells[i];
-        const bool has_spread = several && c[0] != "-";
+        const bool has_spread = with_intervals && c[0] != "-";
         cells.push_back(has_spread ? c[0] + " [" + c[1] + ", " + c[2] + ']' : c[0]);
       }
       rows.push_back({row.label, std::move(cells)});
@@ -119,10 +121,11 @@ void AppendReferences(const std::vector<std::string>& references, Section& secti
 /// a row reports the number of runs with a reference.
 Section TableOf(const std::vector<ComparedEstimator>& estimators, bool several,
                 const std::string& title, std::string ComparedEstimator::*reference,
-                std::int64_t ComparedEstimator::*reference_runs,
+                std::int64_t ComparedEstimator::*reference_runs, ReportRows shown,
                 const std::vector<RowKind>& kinds) {
   Section section;
   section.title = title;
+  section.transposed = several;
   std::vector<Column> columns;
   std::vector<std::string> references;
   TableRow with_reference{"runs with a reference", {}};
@@ -135,7 +138,8 @@ Section TableOf(const std::vector<ComparedEstimator>& estimators, bool several,
                   (estimator.*reference_runs > 0 && estimator.*reference_runs < estimator.used);
   }
   section.columns = Names(columns);
-  const std::vector<TableRow> rows = SpreadRows(columns, several, kinds);
+  const std::vector<TableRow> rows =
+      SpreadRows(columns, several && shown == ReportRows::kAll, kinds);
   if (rows.empty()) return section;
   AppendReferences(references, section);
   section.rows.insert(section.rows.end(), rows.begin(), rows.end());
@@ -215,7 +219,7 @@ Section AlongSection(const Comparison& comparison, bool smoothed, ReportRows row
   Section section = TableOf(estimators, several,
                             smoothed ? "Smoothed: estimates that also use later data"
                                      : "Online: estimates that use only past data",
-                            &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
+                            &ComparedEstimator::reference, &ComparedEstimator::reference_runs, rows,
                             KindsOf(comparison, MetricSection::kAlong, rows));
   const std::vector<TableRow> average_nees = AverageNeesRows(estimators);
   section.rows.insert(section.rows.end(), average_nees.begin(), average_nees.end());
@@ -228,7 +232,7 @@ Section FinalSection(const Comparison& comparison, ReportRows rows) {
   return TableOf(comparison.estimators, comparison.runs > 1,
                  "At the end, when all estimators have the same data",
                  &ComparedEstimator::final_reference, &ComparedEstimator::final_reference_runs,
-                 KindsOf(comparison, MetricSection::kFinal, rows));
+                 rows, KindsOf(comparison, MetricSection::kFinal, rows));
 }
 
 /// Returns the values whose keys start with `kind`. In the keys, `new_kind` replaces `kind`.
@@ -355,7 +359,7 @@ std::string ReferencesText(const Comparison& comparison) {
 constexpr const char* kBoundRatio = "mse_by_bound";
 
 /// Returns lines that define the ratios and their intervals.
-std::vector<std::string> RatioLines(const Comparison& comparison) {
+std::vector<std::string> RatioLines(const Comparison& comparison, ReportRows rows) {
   bool has_reference_ratio = false, has_bound_ratio = false;
   for (const ComparedEstimator& estimator : comparison.estimators) {
     for (const auto& [key, ratio] : estimator.ratios) {
@@ -370,13 +374,15 @@ std::vector<std::string> RatioLines(const Comparison& comparison) {
     lines.emplace_back(
         "the ratios are from one run and have no confidence interval; use --runs N to compute one");
   } else if (has_reference_ratio) {
-    lines.push_back(
-        "ratio: mean error over the runs / mean error of the reference [95 % interval, paired "
-        "bootstrap over the runs]; undecided: the interval includes 1" +
-        (comparison.runs < kFewRuns
-             ? "; too few runs: with fewer than " + std::to_string(kFewRuns) +
-                   " runs the interval is too narrow for a decision"
-             : std::string()));
+    lines.push_back(std::string("ratio: mean error over the runs / mean error of the reference ") +
+                    (rows == ReportRows::kAll ? "[95 % interval, paired "
+                                              : "+- half of the 95 % interval (paired ") +
+                    "bootstrap over the runs" + (rows == ReportRows::kAll ? "]" : ")") +
+                    "; undecided: the interval includes 1" +
+                    (comparison.runs < kFewRuns
+                         ? "; too few runs: with fewer than " + std::to_string(kFewRuns) +
+                               " runs the interval is too narrow for a decision"
+                         : std::string()));
   }
   if (has_bound_ratio) {
     lines.emplace_back(
@@ -392,13 +398,14 @@ std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
   if (!conclusions.empty()) sections.push_back({"Conclusions", {}, {}, conclusions});
   Section& head = sections.emplace_back();
   head.title = comparison.runs > 1
-                   ? std::to_string(comparison.runs) + " runs, mean [5 % and 95 % quantiles]"
+                   ? std::to_string(comparison.runs) + " runs, mean" +
+                         (rows == ReportRows::kAll ? " [5 % and 95 % quantiles]" : "")
                    : std::to_string(comparison.frames) + " frames";
   head.title += comparison.reference.empty() ? ""
                 : comparison.reference == "truth"
                     ? ", errors relative to truth"
                     : ", differences from " + ReferencesText(comparison);
-  head.lines = RatioLines(comparison);
+  head.lines = RatioLines(comparison, rows);
   if (!comparison.measurements_sha256.empty()) {
     head.lines.push_back("data sha256 " + comparison.measurements_sha256);
   }
@@ -498,7 +505,8 @@ internal::Json JsonOfDecomposition(const Comparison& comparison) {
 
 }  // namespace
 
-std::string CompareReport(const Comparison& comparison, TableStyle style, ReportRows rows) {
+std::string CompareReport(const Comparison& comparison, TableStyle style, ReportRows rows,
+                          std::size_t width) {
   std::vector<Section> sections = SectionsOf(comparison, rows);
   const auto count = [](const std::vector<Section>& counted) {
     std::size_t sum = 0;
@@ -509,7 +517,7 @@ std::string CompareReport(const Comparison& comparison, TableStyle style, Report
   if (omitted > 0) {
     sections.push_back({std::to_string(omitted) + " more rows: --all", {}, {}, {}});
   }
-  return internal::SectionsText(sections, style);
+  return internal::SectionsText(sections, style, width);
 }
 
 std::string CompareJson(const Comparison& comparison) {

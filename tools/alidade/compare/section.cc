@@ -6,12 +6,13 @@
 namespace alidade::internal {
 namespace {
 
-std::string PlainText(const Section& section) {
+std::string PlainText(const Section& section, std::size_t width) {
   std::string text = section.title + '\n';
   for (const std::string& line : section.lines) text += "  " + line + '\n';
   if (section.rows.empty()) return text;
+  const Table table = MakeTable(section.columns, section.rows);
   return text + (section.lines.empty() ? "" : "\n") +
-         FormatTable(MakeTable(section.columns, section.rows), TableFormat::kText);
+         FormatTable(section.transposed ? Transposed(table) : table, TableFormat::kText, width);
 }
 
 std::string Markdown(const Section& section) {
@@ -31,13 +32,14 @@ std::string Latex(const Section& section) {
 
 }  // namespace
 
-std::string SectionsText(const std::vector<Section>& sections, TableStyle style) {
+std::string SectionsText(const std::vector<Section>& sections, TableStyle style,
+                         std::size_t width) {
   std::string text;
   for (const Section& section : sections) {
     if (!text.empty()) text += '\n';
     text += style == TableStyle::kMarkdown ? Markdown(section)
             : style == TableStyle::kLatex  ? Latex(section)
-                                           : PlainText(section);
+                                           : PlainText(section, width);
   }
   return text;
 }

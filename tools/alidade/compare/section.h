@@ -15,9 +15,12 @@ struct Section {
   std::vector<std::string> columns;
   std::vector<TableRow> rows;
   std::vector<std::string> lines;
+  bool transposed = false;  ///< true: on a terminal, each element of `columns` is a row
 };
 
-/// Formats sections as lines for a terminal, as Markdown, or as LaTeX without packages.
-std::string SectionsText(const std::vector<Section>& sections, TableStyle style);
+/// Formats sections as lines for a terminal of this width, as Markdown, or as LaTeX without
+/// packages.
+std::string SectionsText(const std::vector<Section>& sections, TableStyle style,
+                         std::size_t width = kDefaultTextWidth);
 
 }  // namespace alidade::internal

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include "alidade/base/error.h"
@@ -88,7 +89,7 @@ std::string NeesText(const char* name, const Nees& nees, int poses) {
 }
 
 /// Returns a table of all statistics of one evaluation, with a row for each relation.
-std::string StatisticsTable(const Evaluation& evaluation) {
+std::string StatisticsTable(const Evaluation& evaluation, std::size_t width) {
   std::vector<std::string> names;
   for (const auto& [name, member] : kStatistics) names.emplace_back(name);
   std::vector<internal::TableRow> rows;
@@ -104,7 +105,7 @@ std::string StatisticsTable(const Evaluation& evaluation) {
   };
   add("ATE", evaluation.absolute);
   add("RPE", evaluation.relative);
-  return FormatTable(internal::MakeTable(names, rows), internal::TableFormat::kText);
+  return FormatTable(internal::MakeTable(names, rows), internal::TableFormat::kText, width);
 }
 
 std::string ConsistencyText(const Evaluation& evaluation) {
@@ -135,7 +136,7 @@ std::string ConsistencyText(const Evaluation& evaluation) {
   return text;
 }
 
-std::string DetailText(const Evaluation& evaluation) {
+std::string DetailText(const Evaluation& evaluation, std::size_t width) {
   std::string text = "reference  " + TrajectoryText(evaluation.reference) + '\n';
   text += "estimate   " + TrajectoryText(evaluation.estimate) + '\n';
   const std::string selection = SelectionText(evaluation.options);
@@ -162,7 +163,7 @@ std::string DetailText(const Evaluation& evaluation) {
     text += '\n';
   }
   if (!evaluation.pairs.empty()) text += "RPE        " + PairsText(evaluation) + '\n';
-  text += '\n' + StatisticsTable(evaluation);
+  text += '\n' + StatisticsTable(evaluation, width);
   const std::string consistency = ConsistencyText(evaluation);
   return consistency.empty() ? text : text + '\n' + consistency;
 }
@@ -238,17 +239,41 @@ std::string SharedText(const std::vector<Evaluation>& evaluations) {
   return text + '.';
 }
 
+/// Appends the rows with the mean, the minimum and the maximum of the errors of one relation, if
+/// the column `header` of the summary contains these errors.
+void AppendExtent(const std::string& header, bool relative,
+                  const std::vector<Evaluation>& evaluations,
+                  std::vector<internal::TableRow>& rows) {
+  const auto& relations = evaluations.front().options.relations;
+  for (std::size_t r = 0; r < relations.size(); ++r) {
+    const std::string kind = relative ? "RPE " : "ATE ";
+    if (header != WithUnit(kind + ToString(relations[r]), UnitOf(relations[r]))) continue;
+    for (const auto& [name, member] : kStatistics) {
+      const std::string_view statistic = name;
+      if (statistic != "mean" && statistic != "min" && statistic != "max") continue;
+      internal::TableRow& row = rows.emplace_back(internal::TableRow{std::string("  ") + name, {}});
+      for (const Evaluation& evaluation : evaluations) {
+        const auto& errors = relative ? evaluation.relative : evaluation.absolute;
+        row.cells.push_back(r < errors.size() ? FixedText(errors[r].statistics.*member, kDecimals)
+                                              : "-");
+      }
+    }
+  }
+}
+
 /// Returns the summary for a terminal, with a column for each evaluation.
-std::string SummaryText(const std::vector<Evaluation>& evaluations) {
+std::string SummaryText(const std::vector<Evaluation>& evaluations, std::size_t width) {
   const internal::Table summary = SummaryTable(evaluations);
   std::vector<std::string> names;
   std::vector<internal::TableRow> rows;
   for (std::size_t c = 1; c < summary.header.size(); ++c) {
     rows.push_back({summary.header[c], {}});
     for (const internal::TextRow& row : summary.rows) rows.back().cells.push_back(row[c]);
+    for (const bool relative : {false, true})
+      AppendExtent(summary.header[c], relative, evaluations, rows);
   }
   for (const Evaluation& evaluation : evaluations) names.push_back(evaluation.label);
-  return FormatTable(internal::MakeTable(names, rows), internal::TableFormat::kText) + '\n' +
+  return FormatTable(internal::MakeTable(names, rows), internal::TableFormat::kText, width) + '\n' +
          SharedText(evaluations) + '\n';
 }
 
@@ -320,11 +345,11 @@ Json JsonOf(const Evaluation& evaluation) {
 
 }  // namespace
 
-std::string EvaluationText(const std::vector<Evaluation>& evaluations) {
+std::string EvaluationText(const std::vector<Evaluation>& evaluations, std::size_t width) {
   ALIDADE_EXPECTS(!evaluations.empty());
   const bool details = evaluations.size() == 1 && evaluations.front().error.empty();
-  if (details) return DetailText(evaluations.front());
-  return SummaryText(evaluations);
+  if (details) return DetailText(evaluations.front(), width);
+  return SummaryText(evaluations, width);
 }
 
 std::string EvaluationMarkdown(const std::vector<Evaluation>& evaluations) {

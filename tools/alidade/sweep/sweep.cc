@@ -92,6 +92,12 @@ class RunQueue {
       }
       RunOptions options;
       options.stop = options_.stop;
+      if (seed == first_seed_ && options_.first_run_progress) {
+        options.progress = [this](std::int64_t done, std::int64_t total) {
+          const std::lock_guard lock(mutex_);
+          if (done_.empty()) options_.first_run_progress(done, total);
+        };
+      }
       internal::ReprojectionRecorder reprojection;
       if (!options_.value.empty()) options.observers = {&reprojection};
       RunResult result =

@@ -41,6 +41,9 @@ struct SweepOptions {
   std::function<RunResult(Experiment&, const RunOptions&)> run;
   /// Receives the number of finished runs and the number of all runs.
   std::function<void(std::int64_t, std::int64_t)> progress;
+  /// Receives the number of finished frames and of all frames of the first run, until a run is
+  /// finished.
+  std::function<void(std::int64_t, std::int64_t)> first_run_progress;
   std::function<bool()> stop;  ///< if it returns true, unfinished runs are discarded
   /// Record of finished runs, from SweepFolder::finished(). Recorded runs are not repeated, and new
   /// runs are added. If it is null, every run is executed.
@@ -181,11 +184,13 @@ struct SweepSummary {
 /// Summarises each estimator over all runs.
 std::vector<SweepSummary> Summarise(const SweepResult& result);
 
-/// Formats the counts of verdicts and the statistics of the main metrics for a terminal.
-/// `summaries` is the result of Summarise(result).
-std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary>& summaries);
+/// Formats the counts of verdicts and the statistics of the main metrics for a terminal of this
+/// width. `summaries` is the result of Summarise(result).
+std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary>& summaries,
+                       std::size_t width = internal::kDefaultTextWidth);
 /// Formats the means of the main metrics in a table for each estimator, with a row for each value.
-std::string SweepTable(const VariedSweep& sweep);
+/// A `*` marks the least error of each block, and the value of NEES or NIS that is nearest to 1.
+std::string SweepTable(const VariedSweep& sweep, std::size_t width = internal::kDefaultTextWidth);
 
 /// Output folder of a sweep (docs/cli.md). It contains sweep.json, runs.csv, table.md, report.html,
 /// config.resolved.yaml, and failures.csv if a run failed. A varied sweep adds sweep.csv. A shard

@@ -67,11 +67,11 @@ Table MetricTable(const std::vector<SweepSummary>& summaries) {
 
 /// Formats the conclusions, the tables of the verdicts and the metrics, and the lines below them.
 std::string FormatTables(const SweepResult& result, const std::vector<SweepSummary>& summaries,
-                         TableFormat format) {
+                         TableFormat format, std::size_t width = kDefaultTextWidth) {
   const char* const title_end = format == TableFormat::kMarkdown ? ":\n\n" : ":\n";
   return FormatConclusions(ConclusionsOf(result, summaries), format) +
-         FormatTable(MakeTable(NamesOf(summaries), VerdictRows(summaries)), format) + '\n' +
-         kMetricsTitle + title_end + FormatTable(MetricTable(summaries), format) +
+         FormatTable(MakeTable(NamesOf(summaries), VerdictRows(summaries)), format, width) + '\n' +
+         kMetricsTitle + title_end + FormatTable(MetricTable(summaries), format, width) +
          ReferenceLines(result);
 }
 
@@ -152,8 +152,9 @@ std::string SweepMarkdown(const SweepResult& result, const std::vector<SweepSumm
 
 namespace alidade {
 
-std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary>& summaries) {
-  return internal::FormatTables(result, summaries, internal::TableFormat::kText);
+std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary>& summaries,
+                       std::size_t width) {
+  return internal::FormatTables(result, summaries, internal::TableFormat::kText, width);
 }
 
 }  // namespace alidade

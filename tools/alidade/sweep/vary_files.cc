@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/sweep/vary_files.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 
+#include "alidade/experiment/metric_key.h"
 #include "alidade/experiment/metric_rows.h"
+#include "alidade/experiment/metric_table.h"
 #include "alidade/io/csv_file.h"
 #include "alidade/sweep/conclusions.h"
 #include "alidade/sweep/table.h"
@@ -64,6 +69,34 @@ ValueTable TableOf(const VariedSweep& sweep, const Column& column) {
   return table;
 }
 
+/// Returns the distance of a metric from its best value; infinite if no value is the best.
+double DistanceFromBest(const MetricInfo& metric, double value) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  if (metric.goal == MetricGoal::kZero) return std::abs(value);
+  if (metric.goal != MetricGoal::kOne) return infinity;
+  return value > 0.0 ? std::abs(std::log(value)) : infinity;
+}
+
+/// Marks the best value of each metric by ` *`, unless several values are equally good.
+void MarkBest(const Column& column, ValueTable& table) {
+  const RunResult comparison = AsComparison(column);
+  const std::vector<std::string> keys = ShownMetrics(comparison);
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    const MetricInfo& metric = *FindMetric(MetricKey::Parse(keys[k]).name);
+    std::vector<double> distances;
+    for (const EstimatorResult& estimator : comparison.estimators) {
+      const auto found = estimator.metrics.find(keys[k]);
+      distances.push_back(found == estimator.metrics.end()
+                              ? std::numeric_limits<double>::infinity()
+                              : DistanceFromBest(metric, found->second));
+    }
+    const auto best = std::ranges::min_element(distances);
+    if (!std::isfinite(*best) || std::ranges::count(distances, *best) > 1) continue;
+    const std::size_t first = table.header.size() - keys.size();
+    table.rows[static_cast<std::size_t>(best - distances.begin())].cells[first + k] += " *";
+  }
+}
+
 }  // namespace
 
 void WriteSweepCsv(const OutputFolder& folder, const VariedSweep& sweep) {
@@ -118,15 +151,16 @@ std::string VariedMarkdown(const VariedSweep& sweep) {
 
 }  // namespace internal
 
-std::string SweepTable(const VariedSweep& sweep) {
+std::string SweepTable(const VariedSweep& sweep, std::size_t width) {
   std::string text =
       internal::FormatConclusions(internal::ConclusionsOf(sweep), internal::TableFormat::kText);
   for (const internal::Column& column : internal::ColumnsOf(sweep)) {
-    const internal::ValueTable table = internal::TableOf(sweep, column);
+    internal::ValueTable table = internal::TableOf(sweep, column);
+    internal::MarkBest(column, table);
     if (column.front().name != sweep.results.front().estimators.front()) text += '\n';
-    text +=
-        column.front().name + ", means by " + sweep.variation.key + '\n' +
-        FormatTable(internal::MakeTable(table.header, table.rows), internal::TableFormat::kText);
+    text += column.front().name + ", means by " + sweep.variation.key + '\n' +
+            FormatTable(internal::MakeTable(table.header, table.rows), internal::TableFormat::kText,
+                        width);
   }
   return text + internal::ReferenceLines(sweep);
 }

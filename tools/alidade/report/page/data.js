@@ -63,6 +63,8 @@ function columnOf(ref) {
 const RUN = DATA.run;
 const COMPARISON = DATA.compare;
 const SWEEP = DATA.sweep;
+/** True: the run has times. The cameras of a bundle adjustment may have numbers only. */
+const HAS_TIMES = RUN !== null && (!DATA.bundle || DATA.bundle.has_times);
 
 const NAMES = RUN
   ? RUN.estimators.map((e) => e.name)
@@ -85,13 +87,15 @@ const isAccepted = (code) => useOf(code) === 'accepted';
 const isUsed = (code) => isAccepted(code) || useOf(code) === 'initialised';
 const isRejected = (code) => useOf(code) === 'rejected';
 
-/** Number of measurements of a sensor that an estimator rejected. */
-const rejectedCount = (e, sensor) =>
+/** Number of measurements of a sensor with one of these uses. */
+const countOfUses = (e, sensor, uses) =>
   sum(
     RUN.outcomes
-      .filter((outcome) => outcome.use === 'rejected')
+      .filter((outcome) => uses.includes(outcome.use))
       .map((outcome) => e.counts[`${outcome.name}:${sensor}`] || 0),
   );
+const rejectedCount = (e, sensor) => countOfUses(e, sensor, ['rejected']);
+const usedCount = (e, sensor) => countOfUses(e, sensor, ['accepted', 'initialised']);
 
 /** The columns of the landmarks of an estimator. */
 const mapColumns = (e) =>

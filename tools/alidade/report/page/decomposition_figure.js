@@ -75,6 +75,7 @@ function decompositionFigure(block) {
       rows: bars.map(({name}) => name).reverse(),
       range: () => [-0.6, bars.length - 0.4],
     },
+    values: () => bars.map(({name, from, to}) => ({name, x: [Math.abs(to - from)], y: [0]})),
     layers: () => [{kind: 'custom', x: null, paint}],
   });
   return {

@@ -142,12 +142,15 @@ class MapView {
     });
   }
 
+  /** The rows of a CSV file: the elements of the positions over time. */
   csv() {
-    const rowsOf = (track) =>
-      Array.from(track.t, (t, i) => {
-        const place = positionAt(track, i).join(' ');
-        return `"map","${track.name}",${t + T0},"${place}",`;
-      });
-    return this.tracks.flatMap(rowsOf);
+    const rowsOf = ({name, t, p}, k) =>
+      Array.from(t, (time, i) =>
+        [`map ${'xyz'[k]}`, name, time + T0, p[k][i], '', HAS_TIMES ? 's' : '', 'm']
+          .map((value) => csvCell(String(value)))
+          .join(','),
+      );
+    const tracks = this.tracks.filter(({name}) => shown(name));
+    return tracks.flatMap((track) => [0, 1, 2].flatMap((k) => rowsOf(track, k)));
   }
 }

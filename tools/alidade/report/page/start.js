@@ -121,6 +121,6 @@ function start() {
 }
 
 /** For tests of the page. */
-window.alidadeReport = {page, plots, run: RUN, columnOf, setTheme};
+window.alidadeReport = {page, plots, run: RUN, bundle: DATA.bundle, columnOf, setTheme};
 
 start();

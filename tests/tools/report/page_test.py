@@ -273,8 +273,16 @@ class RunPages(PageCase):
         self.assertAlmostEqual(self.script("return alidadeReport.page.time"), sum(full) / 2, 2)
         self.expect_landmarks_in_state(folder)
 
+    def test_removed_landmarks(self):
+        folder = self.open("pruned", "run", "10_slam_scene/config.yaml", "--set",
+                           "landmarks.prune.max_missed_frames=1", "--set",
+                           "source.max_features_per_frame=20")
+        self.expect_sound()
+        self.assertGreater(self.expect_landmarks_in_state(folder), 0)
+
     def expect_landmarks_in_state(self, folder):
-        """Expects that the figure ends with the landmarks that are in the state at the end."""
+        """Expects that the figure ends with the landmarks that are in the state at the end. Returns
+        the number of removed landmarks."""
         with open(folder / "ekf/landmarks.csv") as file:
             rows = [row for row in csv.DictReader(file) if row["first_s"]]
         present = sum(not row["removed_s"] for row in rows)
@@ -284,6 +292,7 @@ class RunPages(PageCase):
             const y = plot.spec.layers()[0].y;
             return y[y.length - 1];""")
         self.assertEqual(shown, present)
+        return len(rows) - present
 
     @unittest.skipUnless(IS_LARGE, "ALIDADE_LARGE_PAGES is not set")
     def test_run_with_500_landmarks(self):
@@ -302,6 +311,8 @@ class RunPages(PageCase):
         self.assertGreaterEqual(run["frames"], 50_000)
         self.assertEqual(len(run["estimators"]), 5)
         self.assertLess((folder / "report.html").stat().st_size, 14_000_000)
+        for name, entry in run["estimators"].items():
+            self.expect_rmse(name, "target.depth", entry["metrics"]["rmse:target.depth"])
         zoom = """
             const start = performance.now();
             const {page} = alidadeReport;
@@ -314,6 +325,16 @@ class RunPages(PageCase):
             plots, milliseconds = self.script(zoom, *window)
             self.assertGreater(plots, 0)
             self.assertLess(milliseconds, 2000, window)
+
+    def expect_rmse(self, estimator, block, expected):
+        """Expects the rms of the errors of the page. A long column has a resolution of 1e-3."""
+        rmse = self.script("""
+            const e = alidadeReport.run.estimators.find(q => q.name === arguments[0]);
+            const block = e.blocks.find(q => q.name === arguments[1]);
+            const errors = [...alidadeReport.columnOf(block.error[0])].filter(Number.isFinite);
+            return Math.sqrt(errors.reduce((sum, error) => sum + error ** 2, 0) / errors.length);
+            """, estimator, block)
+        self.assertAlmostEqual(rmse, expected, delta=1e-3 * expected)
 
     def test_stopped_run(self):
         self.open_stopped()

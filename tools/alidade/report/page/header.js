@@ -31,7 +31,8 @@ function facts() {
   if (HAS_TIMES) items.push(...timeFacts(columnOf(RUN.t)));
   if (SWEEP) items.push([strong(SWEEP.runs), ' runs', SWEEP.vary ? ' of each value' : '']);
   if (DATA.seed !== null && DATA.seed !== undefined) items.push(['seed ', strong(DATA.seed)]);
-  if (DATA.reference) items.push(['errors against ', strong(DATA.reference)]);
+  const hasTruth = !RUN || Object.keys(RUN.truth).length > 0 || DATA.reference !== 'truth';
+  if (DATA.reference && hasTruth) items.push(['errors against ', strong(DATA.reference)]);
   if (DATA.hash) items.push(['data ', element('code', {}, DATA.hash)]);
   if (DATA.program) items.push(['alidade ' + DATA.program]);
   return items.map((item) => element('li', {}, item));

@@ -258,6 +258,9 @@ TEST_F(BundleFiles, SavesTheProblemPosesAndPoints) {
   EXPECT_EQ(line("iterations.csv", 3), "1,3,0,0.5");
   EXPECT_TRUE(line("poses.tum", 1).starts_with("0 ")) << line("poses.tum", 1);
   EXPECT_NE(line("bundle.json", 3).find("\"status\": \"converged\""), std::string::npos);
+  std::ostringstream page;
+  page << std::ifstream(folder_ / "o/report.html").rdbuf();
+  EXPECT_NE(page.str().find("<li>The rms reprojection error changed from "), std::string::npos);
   ExpectSame(ReadBundle(folder_ / "o" / "problem.txt"), file);
   EXPECT_THROW(BundleFolder(folder_ / "o", false), Error) << "the folder already exists";
 }

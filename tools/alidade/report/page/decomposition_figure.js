@@ -55,7 +55,7 @@ function decompositionFigure(block) {
     const sign = isTotal ? '' : to > from ? '−' : '+';
     return `${sign}${numberText(Math.abs(to - from) * factor)} ${label}`;
   };
-  const top = 1.34 * Math.max(...bars.map(({from, to}) => Math.max(from, to)));
+  const top = (innerWidth < 520 ? 1.7 : 1.34) * Math.max(...bars.map(({from, to}) => Math.max(from, to)));
   const paint = (surface, X, Y) =>
     bars.forEach((bar, i) => {
       const y = Y.to(bars.length - 1 - i);

@@ -117,8 +117,8 @@ function paintTriad(surface, view, track, i, place) {
   });
 }
 
-function paintScaleBar(surface, {scale, height}) {
-  const metres = niceStep(110 / scale);
+function paintScaleBar(surface, {scale, width, height}) {
+  const metres = niceStep(Math.min(110, 0.16 * width) / scale);
   const end = 16 + metres * scale;
   const y = height - 16;
   const [factor, unit] = unitFor('m', metres);

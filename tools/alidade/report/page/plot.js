@@ -123,10 +123,10 @@ class Plot {
   paint(surface, width, height) {
     this.prepare(width, height);
     const {spec, f} = this;
-    paintSegments(surface, this);
     if (spec.y.rows) paintRows(surface, this);
     else paintYTicks(surface, this);
     paintXAxis(surface, this);
+    paintSegments(surface, this);
     surface.clip(f.l, f.t, f.r - f.l, f.b - f.t);
     this.lost = new Set();
     for (const layer of this.layers) LAYER_PAINTERS[layer.kind](surface, layer, this);

@@ -154,7 +154,7 @@ ExitCode RunBundle(const BundleArguments& arguments) {
                                                     : "points in front of their camera") +
                     "\n  " + Describe(file, left_out));
   }
-  const double rms_before = BundleRms(*sensor, file.problem);
+  const BundleProblem start = file.problem;
 
   Progress progress("iterations", arguments.quiet);
   BundleOptions options;
@@ -167,17 +167,16 @@ ExitCode RunBundle(const BundleArguments& arguments) {
   if (!arguments.loss.empty()) ParseLoss(arguments.loss, options.loss);
   const BundleResult result = AdjustBundle(*sensor, file.problem, options);
   progress.Clear();
-  const double rms_after = BundleRms(*sensor, file.problem);
 
   std::string text = Describe(file, left_out) + '\n';
-  text += "rms " + Short(rms_before) + " px -> " + Short(rms_after) + " px, " +
-          ToString(result.end) + " after " + std::to_string(result.iterations) + " iterations, " +
-          std::to_string(result.residuals) + " residuals, " + std::to_string(result.unknowns) +
-          " unknowns\n";
+  text += "rms " + Short(BundleRms(*sensor, start)) + " px -> " +
+          Short(BundleRms(*sensor, file.problem)) + " px, " + ToString(result.end) + " after " +
+          std::to_string(result.iterations) + " iterations, " + std::to_string(result.residuals) +
+          " residuals, " + std::to_string(result.unknowns) + " unknowns\n";
   for (const std::string& line : DescribeUndetermined(file.problem, *sensor, result))
     text += line + '\n';
   if (folder && result.end != BundleEnd::kFailed) {
-    folder->Save(file, result, rms_before, rms_after);
+    folder->Save(file, start, *sensor, result);
     text += ReportLine(arguments.folder);
   }
   if (!arguments.quiet) PrintText(text);

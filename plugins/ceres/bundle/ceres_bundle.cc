@@ -236,6 +236,9 @@ BundleResult Bundle::Solve() {
   BundleResult result;
   result.message = summary.message;
   result.iterations = std::max(0, static_cast<int>(summary.iterations.size()) - 1);
+  for (const ceres::IterationSummary& step : summary.iterations) {
+    result.steps.push_back({step.cost, step.gradient_max_norm, step.step_is_successful});
+  }
   result.cost_before = summary.initial_cost;
   result.cost_after = summary.final_cost;
   result.residuals = ceres_problem_.NumResiduals();

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -57,6 +58,8 @@ class BundleFiles : public ::testing::Test {
     EXPECT_EQ(a.colours, b.colours);
     EXPECT_EQ(a.keys, b.keys);
   }
+  /// Returns the sensor of BAL.
+  static SharedSensor Sensor() { return MakeSensor(SelfCalibratingFeature<RadialLens>(1.0, true)); }
   testing::TemporaryFolder folder_;
 };
 
@@ -230,13 +233,18 @@ TEST_F(BundleFiles, SavesTheProblemPosesAndPoints) {
   const BundleFile file = ReadText(kBal);
   BundleResult result;
   result.end = BundleEnd::kConverged;
-  BundleFolder(folder_ / "o", false).Save(file, result, 2.0, 1.0);
+  result.steps = {{2.0, 0.5, true}, {3.0, 0.5, false}};
+  BundleProblem start = file.problem;
+  start.points.at(0)[0] += 1.0;
+  BundleFolder(folder_ / "o", false).Save(file, start, *Sensor(), result);
   std::set<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(folder_ / "o")) {
     names.insert(entry.path().filename().string());
   }
-  EXPECT_EQ(names, (std::set<std::string>{"bundle.json", "files.txt", "points.csv", "poses.tum",
-                                          "problem.txt", "report.html"}));
+  EXPECT_EQ(names,
+            (std::set<std::string>{"bundle.json", "files.txt", "iterations.csv", "observations.csv",
+                                   "points.csv", "points_before.csv", "poses.tum",
+                                   "poses_before.tum", "problem.txt", "report.html"}));
   const auto line = [&](const char* name, int number) {
     std::ifstream stream(folder_ / "o" / name);
     std::string text;
@@ -244,17 +252,51 @@ TEST_F(BundleFiles, SavesTheProblemPosesAndPoints) {
     return text;
   };
   EXPECT_EQ(line("points.csv", 2), "0,0.2,0.1,-3");
+  EXPECT_EQ(line("points_before.csv", 2), "0,1.2,0.1,-3");
+  EXPECT_EQ(line("poses_before.tum", 1), line("poses.tum", 1));
+  EXPECT_EQ(line("iterations.csv", 1), "iteration,cost,accepted,gradient");
+  EXPECT_EQ(line("iterations.csv", 3), "1,3,0,0.5");
   EXPECT_TRUE(line("poses.tum", 1).starts_with("0 ")) << line("poses.tum", 1);
   EXPECT_NE(line("bundle.json", 3).find("\"status\": \"converged\""), std::string::npos);
+  std::ostringstream page;
+  page << std::ifstream(folder_ / "o/report.html").rdbuf();
+  EXPECT_NE(page.str().find("<li>The rms reprojection error changed from "), std::string::npos);
   ExpectSame(ReadBundle(folder_ / "o" / "problem.txt"), file);
   EXPECT_THROW(BundleFolder(folder_ / "o", false), Error) << "the folder already exists";
+}
+
+/// The point (0.2, 0.1, -3) of kBal has the pixel (-5.0625, -10.125). The start is 1 m to the side:
+/// p = (-0.05, 0.6), q = 0.3625, z = 136.25 p.
+TEST_F(BundleFiles, SavesResidualsBeforeAndAfter) {
+  BundleFile file = ReadText(kBal);
+  BundleObservation unused = file.problem.observations.at(0);
+  unused.used = false;
+  file.problem.observations.push_back(unused);
+  BundleProblem start = file.problem;
+  start.points.at(0)[0] += 1.0;
+  BundleFolder(folder_ / "o", false).Save(file, start, *Sensor(), {});
+  std::ifstream stream(folder_ / "o/observations.csv");
+  std::string names, used, skipped;
+  std::getline(std::getline(std::getline(stream, names), used), skipped);
+  EXPECT_EQ(names, "camera,point,used,measured.u,measured.v,before.u,before.v,after.u,after.v");
+  double before[2], after[2];
+  ASSERT_EQ(std::sscanf(used.c_str(), "0,0,1,-5.0625,-10.125,%lf,%lf,%lf,%lf", &before[0],
+                        &before[1], &after[0], &after[1]),
+            4)
+      << used;
+  EXPECT_NEAR(before[0], -5.0625 + 0.05 * 136.25, 1e-9);
+  EXPECT_NEAR(before[1], -10.125 + 0.6 * 136.25, 1e-9);
+  EXPECT_NEAR(after[0], 0.0, 1e-9);
+  EXPECT_NEAR(after[1], 0.0, 1e-9);
+  EXPECT_EQ(skipped, "0,0,0,-5.0625,-10.125,,,,");
 }
 
 /// The unregistered camera of kBundler has no pose. A zero is written without a sign.
 TEST_F(BundleFiles, SavesPosesOfRegisteredCamerasOnly) {
   std::string text = kBundler;
   text.replace(text.find("0 -1 0\n1 0 0\n0 0 1\n0 0 1\n"), 25, "1 0 0\n0 1 0\n0 0 1\n0 0 0\n");
-  BundleFolder(folder_ / "o", false).Save(ReadText(text), {}, 2.0, 1.0);
+  const BundleFile file = ReadText(text);
+  BundleFolder(folder_ / "o", false).Save(file, file.problem, *Sensor(), {});
   std::ostringstream poses;
   poses << std::ifstream(folder_ / "o" / "poses.tum").rdbuf();
   EXPECT_EQ(poses.str(), "0 0 0 0 1 0 0 0\n");

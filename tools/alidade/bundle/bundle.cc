@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -49,17 +50,25 @@ class Components {
   std::set<std::size_t> roots_;
 };
 
-/// Computes |z (-) h|^2. Returns nullopt if h is undefined or the result is not finite.
-std::optional<double> SquaredError(const SensorModel& sensor, const BundleRoles& roles,
+using Residual = std::array<double, 4>;
+
+/// Computes z (-) h. The elements beyond the size of z are NaN. Returns nullopt if h is undefined or
+/// |z (-) h|^2 is not finite.
+std::optional<Residual> ResidualOf(const SensorModel& sensor, const BundleRoles& roles,
                                    const BundleProblem& problem,
                                    const BundleObservation& observation) {
-  double h[4], d[4], sum = 0.0;
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  double h[4];
   if (sensor.Predict(RoleValues(roles, problem, observation).data(), h) != Status::kOk)
     return std::nullopt;
   const Geometry& geometry = sensor.measurement().geometry;
-  geometry.Minus(observation.z.data(), h, d);
-  for (int i = 0; i < geometry.tangent; ++i) sum += d[i] * d[i];
-  return std::isfinite(sum) ? std::optional(sum) : std::nullopt;
+  Residual residual = {kNone, kNone, kNone, kNone};
+  geometry.Minus(observation.z.data(), h, residual.data());
+  double sum = 0.0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(geometry.tangent); ++i) {
+    sum += residual[i] * residual[i];
+  }
+  return std::isfinite(sum) ? std::optional(residual) : std::nullopt;
 }
 
 /// Gauge of a problem: the first used camera, and the extent as in BundleResult::extent_before.
@@ -215,20 +224,31 @@ int ExcludeUndefined(const SensorModel& sensor, BundleProblem& problem) {
   const BundleRoles roles = RolesOf(sensor);
   int excluded = 0;
   for (BundleObservation& observation : problem.observations) {
-    observation.used = SquaredError(sensor, roles, problem, observation).has_value();
+    observation.used = ResidualOf(sensor, roles, problem, observation).has_value();
     excluded += observation.used ? 0 : 1;
   }
   return excluded;
 }
 
-double BundleRms(const SensorModel& sensor, const BundleProblem& problem) {
+std::vector<std::array<double, 4>> BundleResiduals(const SensorModel& sensor,
+                                                   const BundleProblem& problem) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const BundleRoles roles = RolesOf(sensor);
+  std::vector<Residual> residuals(problem.observations.size(), {kNone, kNone, kNone, kNone});
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    const BundleObservation& observation = problem.observations[i];
+    const auto residual =
+        observation.used ? ResidualOf(sensor, roles, problem, observation) : std::nullopt;
+    if (residual) residuals[i] = *residual;
+  }
+  return residuals;
+}
+
+double BundleRms(const SensorModel& sensor, const BundleProblem& problem) {
   double sum = 0.0, count = 0.0;
-  for (const BundleObservation& observation : problem.observations) {
-    const auto error =
-        observation.used ? SquaredError(sensor, roles, problem, observation) : std::nullopt;
-    if (!error) continue;
-    sum += *error;
+  for (const Residual& residual : BundleResiduals(sensor, problem)) {
+    if (std::isnan(residual[0])) continue;
+    for (const double element : residual) sum += std::isnan(element) ? 0.0 : element * element;
     count += 1.0;
   }
   return count > 0.0 ? std::sqrt(sum / count) : 0.0;

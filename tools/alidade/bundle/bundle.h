@@ -62,11 +62,19 @@ enum class BundleEnd { kConverged, kOutOfIterations, kStopped, kFailed };
 /// Returns `converged`, `out_of_iterations`, `stopped` or `failed`.
 const char* ToString(BundleEnd end);
 
+/// Step that the solver tried. A step that is not accepted is undone.
+struct BundleIteration {
+  double cost = 0.0;      ///< cost after the step
+  double gradient = 0.0;  ///< largest magnitude among the elements of the gradient
+  bool accepted = true;
+};
+
 /// Result of a bundle adjustment.
 struct BundleResult {
   BundleEnd end = BundleEnd::kFailed;
-  std::string message;  ///< message of the solver
-  int iterations = 0;   ///< number of steps that the solver tried
+  std::string message;                 ///< message of the solver
+  int iterations = 0;                  ///< number of steps that the solver tried
+  std::vector<BundleIteration> steps;  ///< the start, followed by the steps
   double cost_before = 0.0, cost_after = 0.0;
   int residuals = 0;  ///< number of scalar residuals
   int unknowns = 0;   ///< number of estimated tangent elements; the constant first pose is excluded
@@ -106,6 +114,11 @@ SharedSensor BundleSensor(const PluginHost& host, const BundleProblem& problem);
 /// projective camera, h is undefined only for a point in the plane of the camera. Returns the
 /// number of excluded observations.
 int ExcludeUndefined(const SensorModel& sensor, BundleProblem& problem);
+
+/// Computes the residual z (-) h of each observation. The residual of an unused observation, an
+/// undefined residual, and the elements beyond the size of z are NaN.
+std::vector<std::array<double, 4>> BundleResiduals(const SensorModel& sensor,
+                                                   const BundleProblem& problem);
 
 /// Computes the unweighted RMS reprojection error of the used observations:
 ///

@@ -13,14 +13,18 @@ class OutputFolder;
 
 /// Output folder of a bundle adjustment.
 ///
-///   file         rows
-///   problem.EXT  adjusted problem in the format of the input; omitted for tracks. EXT is txt
-///                (bal), out (bundler) or bin (libmv)
-///   poses.tum    t x y z qx qy qz qw, world_from_cam, of registered cameras; t is the time in s or
-///                the number of the camera
-///   points.csv   point,x,y,z
-///   bundle.json  result of AdjustBundle(), and the counts of excluded items
-///   report.html  interactive page
+///   file              content
+///   problem.EXT       adjusted problem in the format of the input; omitted for tracks. EXT is txt
+///                     (bal), out (bundler) or bin (libmv)
+///   poses.tum         t x y z qx qy qz qw, world_from_cam, of registered cameras; t is the time in
+///                     s or the number of the camera
+///   points.csv        point,x,y,z
+///   poses_before.tum  the same before the adjustment
+///   points_before.csv the same before the adjustment
+///   observations.csv  camera, point, measured position, residuals before and after
+///   iterations.csv    cost of each step of the solver
+///   bundle.json       result of AdjustBundle(), and the counts of excluded items
+///   report.html       interactive page
 ///
 /// The folder appears after all files have been written. `force` replaces an existing folder. The
 /// constructor reserves the path, so a conflict is reported before the problem is solved.
@@ -30,9 +34,10 @@ class BundleFolder {
   BundleFolder(const std::filesystem::path& folder, bool force);
   ~BundleFolder();
 
-  /// Writes the files. Call this function once. Errors: kCannotCreate, kIo.
-  void Save(const BundleFile& file, const BundleResult& result, double rms_before,
-            double rms_after);
+  /// Writes the files. `file` contains the adjusted problem, `start` the problem before the
+  /// adjustment. Call this function once. Errors: kCannotCreate, kIo.
+  void Save(const BundleFile& file, const BundleProblem& start, const SensorModel& sensor,
+            const BundleResult& result);
 
  private:
   std::unique_ptr<internal::OutputFolder> output_;

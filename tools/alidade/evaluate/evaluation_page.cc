@@ -6,7 +6,9 @@
 
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
+#include "alidade/base/statistics.h"
 #include "alidade/base/text.h"
+#include "alidade/evaluate/length_errors.h"
 #include "alidade/report/conclusion.h"
 #include "alidade/report/page_text.h"
 #include "alidade/report/trajectory_data.h"
@@ -32,7 +34,7 @@ std::vector<Timestamp> TimesOf(const Trajectory& trajectory) {
 }
 
 PageTrajectory TrajectoryOf(const std::string& name, const Trajectory& trajectory) {
-  PageTrajectory page{name, TimesOf(trajectory), {}, {}, {}, {}};
+  PageTrajectory page{name, TimesOf(trajectory), {}, {}, {}, {}, {}};
   for (int i = 0; i < trajectory.size(); ++i) {
     const Eigen::Vector3d p = trajectory.positions.col(i);
     const Eigen::Quaterniond& q = trajectory.orientations[static_cast<std::size_t>(i)];
@@ -82,6 +84,24 @@ void AppendErrors(const Evaluation& evaluation, Timestamp origin, internal::Colu
   for (const PoseErrors& errors : evaluation.relative) {
     list.push_back(ErrorsOf(evaluation, "RPE", errors, ends, origin, pool));
   }
+}
+
+/// Returns the quantiles of the relative errors over each length, a row for each length.
+Json LengthData(const Evaluation& evaluation) {
+  const auto quantiles = [](const std::vector<double>& ascending) {
+    Json values = Json::array();
+    for (const double q : {0.05, 0.25, 0.5, 0.75, 0.95}) values.push_back(Quantile(ascending, q));
+    return values;
+  };
+  Json rows = Json::array();
+  for (const auto& [length, translations, angles] :
+       internal::ErrorsOverLengths(evaluation.reference, evaluation.estimate)) {
+    rows.push_back({{"length", length},
+                    {"pairs", translations.size()},
+                    {"translation", quantiles(translations)},
+                    {"angle", quantiles(angles)}});
+  }
+  return {{"estimator", evaluation.label}, {"rows", rows}};
 }
 
 std::string ErrorText(const PoseErrors& errors) {
@@ -152,9 +172,10 @@ std::string EvaluationPage(const Evaluations& all) {
   for (const PageTrajectory& estimate : estimates) {
     origin = std::min(origin, estimate.timestamps.front());
   }
-  Json errors = Json::array();
+  Json errors = Json::array(), lengths = Json::array();
   for (const Evaluation& evaluation : evaluations) {
     AppendErrors(evaluation, origin, pool, errors);
+    lengths.push_back(LengthData(evaluation));
   }
   std::vector<std::string> labels;
   for (const Evaluation& evaluation : evaluations) labels.push_back(evaluation.label);
@@ -166,7 +187,8 @@ std::string EvaluationPage(const Evaluations& all) {
        {"run", run},
        {"evaluation",
         {{"conclusions", internal::ConclusionsJson(ConclusionsOf(evaluations))},
-         {"errors", errors}}}},
+         {"errors", errors},
+         {"lengths", lengths}}}},
       pool);
 }
 

@@ -3,13 +3,13 @@
 
 #include <filesystem>
 
-#include "alidade/io/json.h"
 #include "alidade/report/column_pool.h"
 
 namespace alidade::internal {
 
-/// Returns the cameras and points of a bundle adjustment as the object `run` in the data of a page.
-/// Returns null if there is no camera. Errors: kInputMissing, kBadData.
-Json BundleScene(const std::filesystem::path& folder, ColumnPool& pool);
+/// Returns `bundle.json` with conclusions, iterations, the rms of each camera, residuals and the
+/// worst observations. Of many residuals, the largest and each n-th of the others are returned.
+/// Errors: kBadData, kIo.
+Json BundleData(const std::filesystem::path& folder, const Json& bundle, ColumnPool& pool);
 
 }  // namespace alidade::internal

@@ -9,6 +9,7 @@
 #include "alidade/io/read_file.h"
 #include "alidade/io/run_files.h"
 #include "alidade/report/bundle_data.h"
+#include "alidade/report/bundle_scene.h"
 #include "alidade/report/comparison_data.h"
 #include "alidade/report/page_text.h"
 #include "alidade/report/quotation.h"
@@ -149,7 +150,7 @@ Json DataOf(const Folder& folder, internal::ColumnPool& pool) try {
     data["sweep"] = internal::SweepData(folder.path, folder.sweep, pool);
   }
   if (!folder.bundle.is_null()) {
-    data["bundle"] = folder.bundle;
+    data["bundle"] = internal::BundleData(folder.path, folder.bundle, pool);
     data["run"] = internal::BundleScene(folder.path, pool);
   }
   return data;

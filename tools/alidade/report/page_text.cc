@@ -37,7 +37,7 @@ std::string SummaryItems(const Json& data) {
   };
   const std::string reason = data.value("reason", "");
   if (!reason.empty()) add(reason);
-  for (const char* const key : {"compare", "sweep", "evaluation"}) {
+  for (const char* const key : {"compare", "sweep", "evaluation", "bundle"}) {
     if (!data.contains(key) || !data.at(key).is_object()) continue;
     for (const Json& conclusion : data.at(key).value("conclusions", Json::array())) {
       add(conclusion.at("text").get<std::string>());

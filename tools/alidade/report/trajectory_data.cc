@@ -3,7 +3,6 @@
 
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <numeric>
 
 #include "alidade/report/run_tables.h"
 
@@ -56,11 +55,10 @@ Json BlocksOf(const PageTrajectory& trajectory, ColumnPool& pool) {
 }
 
 /// Returns the points as landmarks whose covariances and true positions are unknown.
-Json LandmarksOf(const std::vector<std::array<double, 3>>& points, ColumnPool& pool) {
+Json LandmarksOf(const PageTrajectory& trajectory, ColumnPool& pool) {
+  const std::vector<std::array<double, 3>>& points = trajectory.points;
   Json data = Json::object();
-  std::vector<std::uint32_t> ids(points.size());
-  std::iota(ids.begin(), ids.end(), 0U);
-  data["id"] = pool.AddIntegers(ids);
+  data["id"] = pool.AddIntegers(trajectory.point_ids);
   for (std::size_t i = 0; i < kAxes.size(); ++i) {
     data[kAxes[i]] = pool.AddNumbers(ElementOf(points, i));
   }
@@ -82,7 +80,7 @@ Json EstimatorOf(const PageTrajectory& trajectory, const RunTimes& times, Column
                {"blocks", BlocksOf(trajectory, pool)},
                {"position", kPosition}};
   if (!trajectory.orientations.empty()) data["orientation"] = kOrientation;
-  if (!trajectory.points.empty()) data["landmarks"] = LandmarksOf(trajectory.points, pool);
+  if (!trajectory.points.empty()) data["landmarks"] = LandmarksOf(trajectory, pool);
   for (const char* const key : {"nees", "innovations", "gains", "events"}) {
     data[key] = Json::array();
   }

@@ -15,13 +15,38 @@ function bytes(base64) {
   return out.buffer;
 }
 
-/** A number of a long series: its sign, and the logarithm of its magnitude. */
-function numberOfCode(code, {v: start, s: step}) {
-  const level = code & 0x7fff;
-  const sign = code & 0x8000 ? -1 : 1;
-  if (level === 0) return 0;
-  if (level === 32767) return NaN;
-  return level === 32766 ? sign * Infinity : sign * 2 ** (start + step * (level - 1));
+/**
+ * Numbers of a long series: the sign, and the logarithm of the magnitude. The power of a level is
+ * the product of the powers of its upper and lower bits, which two tables contain.
+ */
+function decodeSeries(codes, {v: start, s: step}) {
+  const power = (exponent) => 2 ** exponent;
+  const upper = Float64Array.from({length: 128}, (_, k) => power(start + step * (256 * k - 1)));
+  const lower = Float64Array.from({length: 256}, (_, k) => power(step * k));
+  const numbers = new Float32Array(codes.length);
+  for (let i = 0; i < codes.length; i++) {
+    const level = codes[i] & 0x7fff;
+    const sign = codes[i] & 0x8000 ? -1 : 1;
+    if (level === 0) numbers[i] = 0;
+    else if (level === 32767) numbers[i] = NaN;
+    else if (level === 32766) numbers[i] = sign * Infinity;
+    else numbers[i] = sign * upper[level >> 8] * lower[level & 255];
+  }
+  return numbers;
+}
+
+/** Numbers of a column with steps; -32768: no value. */
+function decodeSteps(codes, step) {
+  const numbers = new Float32Array(codes.length);
+  for (let i = 0; i < codes.length; i++) numbers[i] = codes[i] === -32768 ? NaN : codes[i] * step;
+  return numbers;
+}
+
+/** The elements of a column at the indices of another column. */
+function decodeSelection(source, indices) {
+  const numbers = new Float64Array(indices.length);
+  for (let i = 0; i < indices.length; i++) numbers[i] = source[indices[i]];
+  return numbers;
 }
 
 function decode(c) {
@@ -30,10 +55,8 @@ function decode(c) {
       return Float64Array.from({length: c.n}, (_, i) => c.v + i * c.s);
     case 'const':
       return new Float32Array(c.n).fill(c.v === null ? NaN : c.v);
-    case 'take': {
-      const of = columnOf(c.of);
-      return Float64Array.from(columnOf(c.i), (i) => of[i]);
-    }
+    case 'take':
+      return decodeSelection(columnOf(c.of), columnOf(c.i));
     case 'f8':
       return new Float64Array(bytes(c.b));
     case 'u1':
@@ -43,9 +66,9 @@ function decode(c) {
     case 'u4':
       return new Uint32Array(bytes(c.b));
     case 'l2':
-      return Float32Array.from(new Uint16Array(bytes(c.b)), (code) => numberOfCode(code, c));
+      return decodeSeries(new Uint16Array(bytes(c.b)), c);
     case 'i2':
-      return Float32Array.from(new Int16Array(bytes(c.b)), (v) => (v === -32768 ? NaN : v * c.s));
+      return decodeSteps(new Int16Array(bytes(c.b)), c.s);
     case 'f4': {
       const f = new Float32Array(bytes(c.b));
       return c.o ? Float64Array.from(f, (v) => v + c.o) : f;
@@ -63,6 +86,8 @@ function columnOf(ref) {
 const RUN = DATA.run;
 const COMPARISON = DATA.compare;
 const SWEEP = DATA.sweep;
+/** True: the run has times. The cameras of a bundle adjustment may have numbers only. */
+const HAS_TIMES = RUN !== null && (!DATA.bundle || DATA.bundle.has_times);
 
 const NAMES = RUN
   ? RUN.estimators.map((e) => e.name)
@@ -85,13 +110,15 @@ const isAccepted = (code) => useOf(code) === 'accepted';
 const isUsed = (code) => isAccepted(code) || useOf(code) === 'initialised';
 const isRejected = (code) => useOf(code) === 'rejected';
 
-/** Number of measurements of a sensor that an estimator rejected. */
-const rejectedCount = (e, sensor) =>
+/** Number of measurements of a sensor with one of these uses. */
+const countOfUses = (e, sensor, uses) =>
   sum(
     RUN.outcomes
-      .filter((outcome) => outcome.use === 'rejected')
+      .filter((outcome) => uses.includes(outcome.use))
       .map((outcome) => e.counts[`${outcome.name}:${sensor}`] || 0),
   );
+const rejectedCount = (e, sensor) => countOfUses(e, sensor, ['rejected']);
+const usedCount = (e, sensor) => countOfUses(e, sensor, ['accepted', 'initialised']);
 
 /** The columns of the landmarks of an estimator. */
 const mapColumns = (e) =>

@@ -55,7 +55,7 @@ function decompositionFigure(block) {
     const sign = isTotal ? '' : to > from ? '−' : '+';
     return `${sign}${numberText(Math.abs(to - from) * factor)} ${label}`;
   };
-  const top = 1.34 * Math.max(...bars.map(({from, to}) => Math.max(from, to)));
+  const top = (innerWidth < 520 ? 1.7 : 1.34) * Math.max(...bars.map(({from, to}) => Math.max(from, to)));
   const paint = (surface, X, Y) =>
     bars.forEach((bar, i) => {
       const y = Y.to(bars.length - 1 - i);
@@ -75,6 +75,7 @@ function decompositionFigure(block) {
       rows: bars.map(({name}) => name).reverse(),
       range: () => [-0.6, bars.length - 0.4],
     },
+    values: () => bars.map(({name, from, to}) => ({name, x: [Math.abs(to - from)], y: [0]})),
     layers: () => [{kind: 'custom', x: null, paint}],
   });
   return {

@@ -16,9 +16,10 @@ function shareLine(group, metric, end) {
   };
 }
 
-/** Numbers of runs in bins between `low` and `high`. */
+/** Numbers of runs in bins between `low` and `high`; n runs have 2 n^(1/3) bins. */
 function histogramLine(group, metric, [low, high], log) {
-  const size = 30;
+  const runs = finiteValues(group, metric).length;
+  const size = clamp(Math.ceil(2 * Math.cbrt(runs)), 4, 40);
   const at = (u) => (log ? low * (high / low) ** u : low + (high - low) * u);
   const placeOf = (v) =>
     log ? Math.log(v / low) / Math.log(high / low) : (v - low) / (high - low);
@@ -62,7 +63,7 @@ function distributionFigure(groups, metric, shape, controls) {
         label: isShare ? 'share of runs' : 'runs',
         name: 'distribution',
         height: 260,
-        x: {label: metric, unit: metricUnit(metric), log, range},
+        x: {label: metricName(metric), unit: metricUnit(metric), log, range},
         y: {unit: '', range: (visible) => [0, isShare ? 1.02 : top(visible)]},
         layers,
       }),

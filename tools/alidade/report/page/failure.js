@@ -64,25 +64,37 @@ function failureSection(main) {
   }
   const hints = CAUSES.filter(([pattern]) => pattern.test(DATA.reason)).map((cause) => cause[1]);
   if (hints.length) box.append(element('p', {}, element('b', {}, 'Likely: '), hints.join(' ')));
-  if (SWEEP) box.append(commandLine('Continue:', `${DATA.command} -o FOLDER --resume`));
+  const isResumable = SWEEP || (RUN && !COMPARISON && DATA.status === 'stopped');
+  if (isResumable && DATA.command)
+    box.append(commandLine('Continue:', `${DATA.command} -o FOLDER --resume`));
   else if (DATA.command) box.append(commandLine('Repeat:', DATA.command));
   main.append(box);
   nav.push(['failure', 'Failure']);
   if (RUN) lastFramesSection(main);
 }
 
-/** Scalar blocks at the end of an estimator, with their 3-sigma bounds. */
-function finalState(e) {
-  const texts = e.blocks
-    .filter((block) => block.value.length === 1)
-    .map((block) => {
-      const value = columnOf(block.value[0]);
-      const last = value.length - 1;
-      const sigma = block.sigma[0] === undefined ? null : columnOf(block.sigma[0])[last];
-      const bound = sigma === null ? '' : ` ± ${numberText(3 * sigma, 2)}`;
-      return ` ${block.name} ${numberText(value[last], 4)}${bound} ${block.unit};`;
-    });
-  return element('p', {style: 'margin:2px 0'}, nameOf(e.name), ' at the end: ', texts);
+/** The elements at the end of an estimator: {e, name, value, sigma, unit}. */
+const finalElements = (e) =>
+  e.blocks.flatMap((block) =>
+    elementsOf(e, block).values.map(({label, unit, y, sigma}) => ({
+      e,
+      name: `${block.name} ${label}`.trim(),
+      unit,
+      value: y[y.length - 1],
+      sigma: sigma ? sigma[sigma.length - 1] : NaN,
+    })),
+  );
+
+/** The state at the end of each estimator. */
+function finalStateTable() {
+  const columns = [
+    {name: 'estimator', text: true, get: (row) => row.e.name, show: (row) => nameOf(row.e.name)},
+    {name: 'state at the end', text: true, get: (row) => row.name},
+    {name: 'value', get: (row) => row.value, show: (row) => withUnit(row.value, row.unit, 4)},
+    {name: '3σ', get: (row) => row.sigma, show: (row) => withUnit(3 * row.sigma, row.unit, 2)},
+  ];
+  const options = {tall: true, off: (row) => page.hidden.has(row.e.name)};
+  return dataTable(columns, RUN.estimators.flatMap(finalElements), options);
 }
 
 /** Measurements of all estimators from time `from` on, newest first. */
@@ -144,6 +156,6 @@ function lastFramesSection(main) {
   const box = section('last', 'The last frames', 'newest first', main);
   const options = {tall: true, off: (row) => page.hidden.has(row.e.name)};
   const table = dataTable(columns, measurementsAfter(from), options);
-  const legend = element('p', {class: 'quiet'}, '± is 3σ');
-  box.append(element('div', {class: 'panel'}, RUN.estimators.map(finalState), legend, table));
+  for (const content of [finalStateTable(), table])
+    box.append(element('div', {class: 'panel'}, content));
 }

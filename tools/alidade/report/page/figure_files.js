@@ -76,5 +76,5 @@ function csvText(plots) {
     if (!plot.layers) plot.draw();
     return plot.csv ? plot.csv() : [];
   });
-  return ['panel,series,x,y,sigma', ...rows].join('\n') + '\n';
+  return ['panel,series,x,y,sigma,x_unit,y_unit', ...rows].join('\n') + '\n';
 }

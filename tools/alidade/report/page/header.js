@@ -26,11 +26,13 @@ const themeButton = () =>
 
 /** The items of the list of facts. Unknown facts are omitted. */
 function facts() {
-  const items = [[strong(NAMES.length), NAMES.length === 1 ? ' estimator' : ' estimators']];
-  if (RUN) items.push(...timeFacts(columnOf(RUN.t)));
+  const names = [strong(NAMES.length), NAMES.length === 1 ? ' estimator' : ' estimators'];
+  const items = DATA.bundle ? bundleFacts() : [names];
+  if (HAS_TIMES) items.push(...timeFacts(columnOf(RUN.t)));
   if (SWEEP) items.push([strong(SWEEP.runs), ' runs', SWEEP.vary ? ' of each value' : '']);
   if (DATA.seed !== null && DATA.seed !== undefined) items.push(['seed ', strong(DATA.seed)]);
-  if (DATA.reference) items.push(['errors against ', strong(DATA.reference)]);
+  const hasTruth = !RUN || Object.keys(RUN.truth).length > 0 || DATA.reference !== 'truth';
+  if (DATA.reference && hasTruth) items.push(['errors against ', strong(DATA.reference)]);
   if (DATA.hash) items.push(['data ', element('code', {}, DATA.hash)]);
   if (DATA.program) items.push(['alidade ' + DATA.program]);
   return items.map((item) => element('li', {}, item));

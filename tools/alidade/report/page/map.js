@@ -47,7 +47,7 @@ class MapView {
 
   /** The time of the map: that of the cursor, of a kept cursor, or the end. */
   time() {
-    return page.cursor ?? page.time ?? page.full[1];
+    return HAS_TIMES ? (page.cursor ?? page.time ?? page.full[1]) : Infinity;
   }
 
   /** The quantity that colours a trajectory, in row i. */
@@ -116,9 +116,11 @@ class MapView {
       surface.path(pathBetween(view, track, end, last), style);
     }
     const style = {stroke: color, width: 2.2, dash: dashOf(track.name), alpha};
-    if (!range) surface.path(pathBetween(view, track, 0, end), style);
+    if (!HAS_TIMES) paintPlaces(surface, view, track);
+    else if (!range) surface.path(pathBetween(view, track, 0, end), style);
     else
       paintColouredPath(surface, view, track, end, (q, i) => this.valueAt(q, i), range);
+    if (!HAS_TIMES) return;
     const start = {stroke: color, fill: colours.panel, width: 2, alpha};
     surface.marks(placeAt(0), 'dot', 4, start);
     const map = this.maps.find(({name}) => name === track.name);
@@ -140,12 +142,15 @@ class MapView {
     });
   }
 
+  /** The rows of a CSV file: the elements of the positions over time. */
   csv() {
-    const rowsOf = (track) =>
-      Array.from(track.t, (t, i) => {
-        const place = positionAt(track, i).join(' ');
-        return `"map","${track.name}",${t + T0},"${place}",`;
-      });
-    return this.tracks.flatMap(rowsOf);
+    const rowsOf = ({name, t, p}, k) =>
+      Array.from(t, (time, i) =>
+        [`map ${'xyz'[k]}`, name, time + T0, p[k][i], '', HAS_TIMES ? 's' : '', 'm']
+          .map((value) => csvCell(String(value)))
+          .join(','),
+      );
+    const tracks = this.tracks.filter(({name}) => shown(name));
+    return tracks.flatMap((track) => [0, 1, 2].flatMap((k) => rowsOf(track, k)));
   }
 }

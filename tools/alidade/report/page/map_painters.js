@@ -46,7 +46,7 @@ function paintLandmarks(surface, view, map, time, options, spots) {
   surface.path(errors, {stroke: color, width: 1, alpha: 0.6 * alpha});
   surface.marks(truths, 'plus', 3.5, {stroke: colours.muted, width: 1.2, alpha: 0.9});
   surface.marks(removed, 'dot', 1.6, {fill: colours.faint, alpha: 0.5});
-  surface.marks(present, 'dot', 2.3, {fill: color, alpha});
+  surface.marks(present, 'dot', map.x.length > 500 ? 1.4 : 2.3, {fill: color, alpha});
 }
 
 /** The projected points of a trajectory from row `begin` to row `end`. */
@@ -60,6 +60,13 @@ function pathBetween(view, track, begin, end) {
   for (let i = begin; i < end; i += step) add(i);
   add(end);
   return points;
+}
+
+/** Draws the positions of a trajectory without times as triangles. */
+function paintPlaces(surface, view, track) {
+  const places = Array.from(track.t, (_, i) => view.project(positionAt(track, i))).flat();
+  const style = {stroke: colorOf(track.name), width: 1.4, alpha: dim(track.name)};
+  surface.marks(places, 'tri', 4, style);
 }
 
 /** Draws a trajectory up to row `end` in the colours of a quantity with the range `range`. */
@@ -110,8 +117,8 @@ function paintTriad(surface, view, track, i, place) {
   });
 }
 
-function paintScaleBar(surface, {scale, height}) {
-  const metres = niceStep(110 / scale);
+function paintScaleBar(surface, {scale, width, height}) {
+  const metres = niceStep(Math.min(110, 0.16 * width) / scale);
   const end = 16 + metres * scale;
   const y = height - 16;
   const [factor, unit] = unitFor('m', metres);

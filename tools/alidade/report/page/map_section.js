@@ -54,9 +54,11 @@ function colourChoice(map) {
     ['estimator', 'estimator'],
     map.truth && ['error', 'error'],
     hasSigma && ['sigma', 'σ'],
-    ['time', 'time'],
+    HAS_TIMES && ['time', 'time'],
   ];
-  return choice('colour', items.filter(Boolean), options.paintBy, (value) => {
+  const known = items.filter(Boolean);
+  if (known.length < 2) return null;
+  return choice('colour', known, options.paintBy, (value) => {
     options.paintBy = value;
     redraw();
   });
@@ -89,9 +91,22 @@ function mapButtons(maps) {
     small('+', 'zoom in', scaleBy(1.3)),
     small('−', 'zoom out', scaleBy(1 / 1.3)),
     small('fit', 'fit all', scaleBy(0)),
-    element('button', props, '3σ ellipses'),
+    map.tracks.some(({sigma}) => sigma.length) && element('button', props, '3σ ellipses'),
   ];
   return [modeChoice, colourChoice(map), element('span', {class: 'group'}, zoom)];
+}
+
+function mapHint(map, hasLandmarks) {
+  const hasMeasurements = RUN.estimators.some((e) => e.innovations.length);
+  const texts = [
+    map.truth && 'Dashed: truth.',
+    `Left: ${map.planeName}, seen from above. Right: drag to turn, shift-drag to move; click, ` +
+      'then use the wheel, to zoom.',
+    HAS_TIMES && 'Both show the time of the slider and follow the cursor of the plots.',
+    hasLandmarks && hasMeasurements && 'Rays lead to the landmarks seen then, red if rejected.',
+    DATA.bundle && bundleMapHint(map),
+  ];
+  return texts.filter(Boolean).join(' ');
 }
 
 /** The map, if an estimator has a position in a plane or in space. */
@@ -102,15 +117,12 @@ function mapSection(main) {
   const box = section('map', 'Map', '', main);
   const top = new MapView('top');
   const oblique = new MapView('3d', top);
-  top.extra = [timeSlider(top)];
+  if (HAS_TIMES) top.extra = [timeSlider(top)];
   const hasLandmarks = top.maps.length > 0;
-  const rays = hasLandmarks ? '. Rays lead to the landmarks seen then, red if rejected' : '';
+  const subject = hasLandmarks ? 'Trajectory and landmarks' : 'Trajectory';
   figure(box, {
-    title: 'Trajectory' + (hasLandmarks ? ' and landmarks' : ''),
-    hint:
-      `${top.truth ? 'Dashed: truth. ' : ''}Left: ${top.planeName}, seen from above. Right: drag ` +
-      'to turn, shift-drag to move; click, then use the wheel, to zoom. Both show the time of ' +
-      `the slider and follow the cursor of the plots${rays}.`,
+    title: DATA.bundle ? 'Cameras and points' : subject,
+    hint: mapHint(top, hasLandmarks),
     plots: [top, oblique],
     controls: mapButtons([top, oblique]),
     className: 'maps',

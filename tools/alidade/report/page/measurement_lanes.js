@@ -54,7 +54,7 @@ function paintLane(surface, X, plot, lane, y) {
     if (height) surface.rect(l + x - wide / 2, y + 10, wide, size, {fill: REJECTED(), alpha});
   });
   const rejected = rejectedCount(e, I.sensor);
-  const used = e.counts[`accepted:${I.sensor}`] || 0;
+  const used = usedCount(e, I.sensor);
   const most = isMap ? `, up to ${top} at a time` : '';
   const label = {size: 10.5, halo: true};
   surface.text(`${e.name} · ${I.sensor}`, l + 2, y + 5, {

@@ -49,6 +49,7 @@ function unitFor(unit, size) {
 }
 
 const withUnit = (v, unit, digits) => {
+  if (Number.isNaN(v)) return '–';
   const [f, l] = unitFor(unit, Math.abs(v));
   return numberText(v * f, digits) + (l ? (l === '°' ? '' : '\u202f') + l : '');
 };

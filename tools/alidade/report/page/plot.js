@@ -27,6 +27,7 @@ const resizer = new ResizeObserver((entries) => {
  *   zero     true: the y axis is symmetric about zero
  *   equal    true: both axes have the same scale
  *   x, y     {label, unit, log, range(layers), ticks}; y.rows: names of categories at 0, 1, ...
+ *   values() the contents of a CSV file, if the layers have none
  *   layers() the layers at present: {kind, x, y, ...}; kind is line, band, dots, h, v, hband or
  *            custom. `est` is the estimator of a layer, `tip(i)` the content of its tip
  *
@@ -122,10 +123,10 @@ class Plot {
   paint(surface, width, height) {
     this.prepare(width, height);
     const {spec, f} = this;
-    paintSegments(surface, this);
     if (spec.y.rows) paintRows(surface, this);
     else paintYTicks(surface, this);
     paintXAxis(surface, this);
+    paintSegments(surface, this);
     surface.clip(f.l, f.t, f.r - f.l, f.b - f.t);
     this.lost = new Set();
     for (const layer of this.layers) LAYER_PAINTERS[layer.kind](surface, layer, this);
@@ -170,23 +171,28 @@ class Plot {
     }
   }
 
-  /** The rows of a CSV file with the visible layers. */
+  /** The rows of a CSV file with the visible layers, in SI units. */
   csv() {
-    const quoted = (text) => `"${text.replace(/"/g, '""')}"`;
+    const {spec} = this;
+    const units = [spec.time ? 's' : (spec.x && spec.x.unit) || '', spec.y.unit || ''].map(csvCell);
+    const layers = spec.values ? spec.values().filter(({est}) => shown(est)) : this.layers;
     const rows = [];
-    for (const L of this.layers.filter(({x, y, kind}) => x && y && kind !== 'custom')) {
+    for (const L of layers.filter(({x, y}) => x && y)) {
       const name = unique([L.est, L.name].filter(Boolean)).join(' ') || L.kind;
-      const start = [quoted(this.spec.label || ''), quoted(name)];
+      const start = [spec.label || spec.name || '', name].map(csvCell);
       for (let i = 0; i < L.x.length; i++) {
         if (L.only && !L.only(i)) continue;
-        const x = L.x[i] + (this.spec.time ? T0 : 0);
+        const x = L.x[i] + (spec.time ? T0 : 0);
         const y = Number.isNaN(L.y[i]) ? '' : L.y[i];
-        rows.push([...start, x, y, L.s ? L.s[i] : ''].join(','));
+        rows.push([...start, x, y, L.s ? L.s[i] : '', ...units].join(','));
       }
     }
     return rows;
   }
 }
+
+/** A text as a cell of a CSV file. */
+const csvCell = (text) => (/[",\n]/.test(text) ? `"${text.replace(/"/g, '""')}"` : text);
 
 function dispose(ps) {
   for (const p of ps) {

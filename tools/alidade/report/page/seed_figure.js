@@ -7,7 +7,7 @@ const runTip = (group, metric) => (i) => {
   return [
     element('b', {}, `seed ${seed}`),
     nameOf(group.estimator),
-    ` ${metric} ${withUnit(valuesOf(group, metric)[i], metricUnit(metric))}`,
+    ` ${metricName(metric)} ${withUnit(valuesOf(group, metric)[i], metricUnit(metric))}`,
     element('br'),
     element('code', {}, seedCommand(group, seed)),
   ];
@@ -26,11 +26,11 @@ function seedFigure(groups, metric) {
   const hasBounds = groups.some(({bounds}) => bounds[metric]);
   const log = isLogMetric(metric, groups.flatMap((group) => finiteValues(group, metric)));
   const plot = new Plot({
-    label: metric,
+    label: metricName(metric),
     name: 'seeds',
     height: rows.length * 54 + 56,
     left: innerWidth < 520 ? 104 : 168,
-    x: {label: metric, unit: metricUnit(metric), log},
+    x: {label: metricName(metric), unit: metricUnit(metric), log},
     y: {unit: '', rows, range: () => [-0.6, rows.length - 0.4]},
     layers: () => [
       {kind: 'custom', x: null, paint: boundsPainter(figureOf)},

@@ -4,7 +4,7 @@
 /** Sets the time range of the page. Returns false if the page has no time. */
 function setTimeRange() {
   const over_time = COMPARISON && COMPARISON.over_time;
-  const ref = RUN ? RUN.t : over_time ? over_time.t : null;
+  const ref = HAS_TIMES ? RUN.t : over_time ? over_time.t : null;
   if (ref === null) return false;
   const times = columnOf(ref);
   const last = times[times.length - 1];
@@ -69,7 +69,7 @@ function runSections(main, summary) {
     metricFold(summary);
   }
   mapSection(main);
-  stateSection(main);
+  if (HAS_TIMES) stateSection(main);
   consistencySection(main);
   measurementSection(main);
   if (!JUDGED.length) return;
@@ -105,7 +105,7 @@ function start() {
   readHash();
   const head = headerOf();
   document.getElementById('app').append(head, legendBar(hasTime), main, footer(), tip);
-  if (DATA.status !== 'ok') failureSection(main);
+  if (DATA.status !== 'ok' && !DATA.bundle) failureSection(main);
   const summary = summarySection(main);
   if (DATA.evaluation) evaluationSection(main);
   if (DATA.bundle) bundleSection(main);
@@ -121,6 +121,6 @@ function start() {
 }
 
 /** For tests of the page. */
-window.alidadeReport = {page, plots, run: RUN, columnOf, setTheme};
+window.alidadeReport = {page, plots, run: RUN, bundle: DATA.bundle, columnOf, setTheme};
 
 start();

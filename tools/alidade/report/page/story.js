@@ -8,7 +8,7 @@ function story() {
   if (DATA.status !== 'ok') {
     const word = DATA.status === 'failed' ? 'failed' : 'was stopped';
     const end = `at ${clock(page.full[1])} s, after ${plural(DATA.frames || 0, 'frame')}`;
-    add('bad', '✕', [`The run ${word} ${end}.`], DATA.reason);
+    add('bad', '✕', [`The run ${word} ${end}.`]);
   }
   consistentItem(add);
   for (const group of similarEstimators()) estimatorItem(group, add);

@@ -1,6 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // Surfaces: one set of drawing calls, on a canvas or as SVG.
 
+/** A picture of one colour that covers the cells, which are columns of H pixels. */
+function cellPicture(cells, W, H, colour) {
+  const canvas = element('canvas', {width: W, height: H});
+  const context = canvas.getContext('2d');
+  const image = context.createImageData(W, H);
+  for (let x = 0; x < W; x++)
+    for (let y = 0; y < H; y++) image.data[4 * (y * W + x) + 3] = 255 * cells[x * H + y];
+  context.putImageData(image, 0, 0);
+  context.globalCompositeOperation = 'source-in';
+  context.fillStyle = colour;
+  context.fillRect(0, 0, W, H);
+  return canvas;
+}
+
 // pts are flat: x, y, x, y, ...; a NaN lifts the pen. style: {stroke, width, dash, fill, alpha}
 class CanvasSurface {
   constructor(ctx) {
@@ -49,9 +63,8 @@ class CanvasSurface {
   }
   runs(cells, W, H, x0, y0, o) {
     this.style(o);
-    this.c.beginPath();
-    eachRun(cells, W, H, (x, y, n) => this.c.rect(x0 + x, y0 + y, 1.4, n + 0.4));
-    this.c.fill();
+    this.c.imageSmoothingEnabled = false;
+    this.c.drawImage(cellPicture(cells, W, H, o.fill), Math.round(x0), Math.round(y0));
   }
   text(s, x, y, o = {}) {
     const c = this.c;

@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Access to the runs of a sweep.
 
+/** The name of a metric on the page: `RMSE target.depth`, `NEES target`. */
+const METRIC_NAMES = {'rmse:': 'RMSE ', 'nees.mean:': 'NEES ', 'nis.mean:': 'NIS '};
+function metricName(metric) {
+  const prefix = Object.keys(METRIC_NAMES).find((start) => metric.startsWith(start));
+  return prefix ? METRIC_NAMES[prefix] + metric.slice(prefix.length) : metric;
+}
+
 const metricUnit = (metric) => SWEEP.units[metric] || '';
 
 /** Distance of a value from the best value of the metric, for the rank of a run; NaN: no rank. */

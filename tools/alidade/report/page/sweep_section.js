@@ -9,7 +9,7 @@ const DISTRIBUTIONS = [
 /** A list of metrics to select from. */
 function metricSelect(label, selected, change) {
   const options = SWEEP.metrics.map((metric) =>
-    element('option', {value: metric, selected: metric === selected}, metric),
+    element('option', {value: metric, selected: metric === selected}, metricName(metric)),
   );
   const onchange = (event) => change(event.target.value);
   return element(

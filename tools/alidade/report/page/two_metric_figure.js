@@ -19,10 +19,14 @@ function twoMetricFigure(groups, metric, second, controls) {
     controls,
     plots: [
       new Plot({
-        label: second,
+        label: metricName(second),
         name: 'two metrics',
         height: 260,
-        x: {label: metric, unit: metricUnit(metric), log: isLogMetric(metric, all(metric))},
+        x: {
+          label: metricName(metric),
+          unit: metricUnit(metric),
+          log: isLogMetric(metric, all(metric)),
+        },
         y: {unit: metricUnit(second), log: isLogMetric(second, all(second))},
         layers: () =>
           visibleGroups(groups)

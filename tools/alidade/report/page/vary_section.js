@@ -60,7 +60,7 @@ function variedFigure(metric, axis) {
   };
   const one = {kind: 'h', v: 1, color: () => colours.muted, dash: [2, 3]};
   return {
-    title: metric,
+    title: metricName(metric),
     plots: [
       new Plot({
         label: 'mean',

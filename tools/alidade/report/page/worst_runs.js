@@ -22,7 +22,11 @@ function worstRunTable(groups, metric) {
     },
     {name: 'rank', get: (r) => r.rank, show: (r) => String(r.rank)},
     {name: 'seed', get: (r) => r.seed, show: (r) => String(r.seed)},
-    {name: metric, get: (r) => r.value, show: (r) => withUnit(r.value, metricUnit(metric))},
+    {
+      name: metricName(metric),
+      get: (r) => r.value,
+      show: (r) => withUnit(r.value, metricUnit(metric)),
+    },
     {name: 'command', text: true, get: (r) => r.seed, show: commandCell},
   ];
   return element(

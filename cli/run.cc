@@ -11,12 +11,14 @@
 
 #include "alidade/experiment/metric_rows.h"
 #include "alidade/record/follower.h"
+#include "alidade/record/live_run.h"
 #include "alidade/record/recorder.h"
 #include "alidade/record/run_viewer.h"
 #include "alidade/replay/run_inputs.h"
 #include "alidade/report/conclusion.h"
 #include "command.h"
 #include "console.h"
+#include "live_port.h"
 #include "video_name.h"
 
 namespace alidade::cli {
@@ -40,7 +42,7 @@ struct RunArguments {
   std::optional<std::uint64_t> seed;
   bool force = false, quiet = false, covariances = false, all = false;
   bool follow = false, view = false, strict = false;
-  std::string video;
+  std::string video, live;
 };
 
 /// Events of one estimator that have the same kind.
@@ -116,6 +118,23 @@ std::unique_ptr<RunViewer> ViewerOf(const RunArguments& arguments, const Experim
   return viewer;
 }
 
+/// Returns the server of the live page, or null if it is not requested.
+std::unique_ptr<LiveRun> LiveRunOf(const RunArguments& arguments, const Config& config,
+                                   const std::filesystem::path& folder) {
+  if (arguments.live.empty()) return nullptr;
+  auto live = std::make_unique<LiveRun>(PortOf(arguments.live), folder, config);
+  if (!arguments.quiet) PrintNote("live page at " + live->address());
+  return live;
+}
+
+/// Sends the report to the browsers that show the live page, and stops its server.
+void FinishLive(LiveRun& live, const std::filesystem::path& folder, bool quiet) {
+  live.Finish();
+  if (quiet) return;
+  PrintNote("the live page ended with " + std::to_string(live.dropped()) +
+            " dropped updates; its report is " + (folder / "report.html").string());
+}
+
 /// Returns the options that affect the bytes of the run folder.
 std::vector<std::string> ArgumentsOf(const RunArguments& arguments) {
   std::vector<std::string> list = {"run"};
@@ -127,6 +146,7 @@ Recorder::Options RecordOf(const RunArguments& arguments, const Config& config,
                            const std::filesystem::path& folder, const PluginHost& host) {
   Recorder::Options record{folder, arguments.force, arguments.command};
   record.covariances = arguments.covariances;
+  if (!arguments.live.empty()) record.max_delay = LiveRun::kMaxDelay;
   record.plugins = internal::HashFiles(internal::FindUsedPlugins({config}, host));
   record.inputs =
       arguments.input.InputsText(config, ArgumentsOf(arguments), {config}, record.plugins);
@@ -146,6 +166,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   StopOnSignals();  // BuildExperiment may wait for a pipe, which a signal must interrupt
   Experiment experiment = BuildExperiment(config, host);
   const std::unique_ptr<RunViewer> viewer = ViewerOf(arguments, experiment, config);
+  const std::unique_ptr<LiveRun> live = LiveRunOf(arguments, config, output.folder);
   Recorder recorder(RecordOf(arguments, config, output.folder, host), config);
   if (!arguments.quiet) ReportOutput(output);
 
@@ -155,6 +176,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   Follower follower(Print);
   if (arguments.follow) options.observers.push_back(&follower);
   if (viewer) options.observers.push_back(viewer.get());
+  if (live) options.observers.push_back(live.get());
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
   const RunResult result = Run(experiment, options);
@@ -163,6 +185,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (result.frames == 0 && result.status == RunStatus::kFailed)
     throw Error(result.code, result.reason);
   recorder.Finish(result);
+  if (live) FinishLive(*live, output.folder, arguments.quiet);
   if (viewer) viewer->Close();
   if (!arguments.quiet && !arguments.follow) {
     const std::string table = arguments.all
@@ -201,6 +224,11 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
       ->check(IsAvi);
   command.add_flag("--view", arguments->view,
                    "show the annotated images in a window during the run");
+  command
+      .add_option("--live", arguments->live,
+                  "serve the page of the run at 127.0.0.1 during the run; 0: any free port")
+      ->option_text("PORT")
+      ->check(IsLivePort);
   command.add_flag("--covariances", arguments->covariances,
                    "write the covariance of every estimate, for `alidade compare`");
   command.footer(kRunFooter);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <fstream>
 #include <limits>
 
 #include "alidade/io/read_file.h"
@@ -11,13 +12,51 @@
 #include "alidade/io/text_cell.h"
 
 namespace alidade::internal {
+namespace {
 
-CsvColumns::CsvColumns(const std::filesystem::path& file) : file_(file) {
+/// Returns the header and the last `rows` complete rows of a file. Reads only the end of the file.
+/// Quoted cells must not contain line ends.
+std::string HeaderAndLastRows(std::ifstream file, std::size_t rows) {
+  constexpr std::streamoff kBlock = 1 << 16;
+  std::string header;
+  if (!std::getline(file, header) || file.eof()) return "";
+  const std::streamoff begin = file.tellg();
+  file.seekg(0, std::ios::end);
+  std::string text;
+  std::size_t ends = 0;  // number of line ends in `text`
+  for (std::streamoff start = file.tellg(); start > begin && ends <= rows;) {
+    const std::streamoff size = std::min(kBlock, start - begin);
+    std::string block(static_cast<std::size_t>(size), '\0');
+    file.seekg(start -= size);
+    file.read(block.data(), size);
+    ends += static_cast<std::size_t>(std::ranges::count(block, '\n'));
+    text.insert(0, block);
+  }
+  std::size_t end = text.rfind('\n');  // of the row before the first one to return
+  for (std::size_t row = 0; row < rows && end != text.npos; ++row) {
+    end = end == 0 ? text.npos : text.rfind('\n', end - 1);
+  }
+  return header + '\n' + text.substr(end == text.npos ? 0 : end + 1);
+}
+
+}  // namespace
+
+CsvColumns::CsvColumns(const std::filesystem::path& file, std::size_t last_rows) : file_(file) {
   std::error_code error;
   if (!std::filesystem::exists(file, error)) return;
   RequireFile(file);
-  *text_ = ReadFile(file, [&](ExitCode, int) { FailFile(file, 0, "the file cannot be read"); });
+  *text_ =
+      last_rows == kAllRows
+          ? ReadFile(file, [&](ExitCode, int) { FailFile(file, 0, "the file cannot be read"); })
+          : HeaderAndLastRows(OpenFile(file), last_rows);
   Parse();
+}
+
+void CsvColumns::Keep(std::size_t first, std::size_t count) {
+  const auto cell = [&](std::size_t row) {
+    return cells_.begin() + static_cast<std::ptrdiff_t>(row * width());
+  };
+  cells_ = std::vector(cell(first), cell(first + count));
 }
 
 void CsvColumns::Fail(std::size_t row, const std::string& problem) const {

@@ -12,14 +12,15 @@
 
 namespace alidade::internal {
 
-/// CSV file of a run folder, read as a whole. Cells are identified by the name of their column and
+/// CSV file of a run folder, or its last rows. Cells are identified by the name of their column and
 /// the index of their row. A last row without a line end is omitted: the run was interrupted while
-/// it was written.
+/// it was written, or is writing it now.
 class CsvColumns {
  public:
-  /// Reads `file`. The result has no columns if the file does not exist. Errors: kBadData with file
-  /// and line, kIo.
-  explicit CsvColumns(const std::filesystem::path& file);
+  static constexpr std::size_t kAllRows = static_cast<std::size_t>(-1);
+  /// Reads the last `last_rows` rows of `file`. The result has no columns if the file does not
+  /// exist. Errors: kBadData with file and line, kIo.
+  explicit CsvColumns(const std::filesystem::path& file, std::size_t last_rows = kAllRows);
 
   std::size_t rows() const { return width() == 0 ? 0 : cells_.size() / width(); }
   const std::vector<std::string_view>& names() const { return names_; }
@@ -32,6 +33,8 @@ class CsvColumns {
   std::vector<double> Numbers(std::string_view name) const;
   /// Returns the timestamps of a column. An empty cell becomes kNoTimestamp. Error: kBadData.
   std::vector<Timestamp> Times(std::string_view name = "t_s") const;
+  /// Removes all rows except `count` rows from row `first` on.
+  void Keep(std::size_t first, std::size_t count);
 
  private:
   std::size_t width() const { return names_.size(); }

@@ -74,7 +74,7 @@ std::string Filled(std::string_view page,
 
 }  // namespace
 
-std::string PageText(const Json& data, const ColumnPool& pool) {
+std::string DataText(const Json& data, const ColumnPool& pool) {
   Json whole = {{"format", "alidade-report"},
                 {"version", 1},
                 {"status", "ok"},
@@ -94,16 +94,20 @@ std::string PageText(const Json& data, const ColumnPool& pool) {
                 {"compare", {}},
                 {"sweep", {}},
                 {"evaluation", {}},
-                {"bundle", {}}};
+                {"bundle", {}},
+                {"explain", {}}};
   whole.update(data);
   std::string text = whole.dump(-1, ' ', false, Json::error_handler_t::replace);
   text.back() = ',';  // the columns follow
-  text += "\"columns\":" + pool.Text() + '}';
+  return text + "\"columns\":" + pool.Text() + '}';
+}
+
+std::string PageText(const Json& data, const ColumnPool& pool) {
   return Filled(kPageTemplate, {{"title", HtmlEscaped(data.at("title").get<std::string>())},
                                 {"summary", SummaryItems(data)},
                                 {"style", kPageStyle},
                                 {"script", kPageScript},
-                                {"data", ScriptEscaped(text)}});
+                                {"data", ScriptEscaped(DataText(data, pool))}});
 }
 
 void WritePage(const OutputFolder& folder) {

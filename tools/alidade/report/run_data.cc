@@ -126,29 +126,31 @@ Json SegmentData(const Node& config, const std::deque<EstimatorTables>& estimato
 
 }  // namespace
 
-Json RunData(const fs::path& folder, const Json& run, const Node& config, ColumnPool& pool) {
+Json RunData(const fs::path& folder, const Json& run, const Node& config, const RunRows& rows,
+             ColumnPool& pool) {
   if (!run.contains("estimators")) return {};
   std::deque<EstimatorTables> estimators;
-  const CsvColumns truth(folder / "truth.csv");
+  const CsvColumns truth(folder / "truth.csv", rows.last);
   std::vector<Timestamp> timestamps = truth.Times();
   for (const auto& [name, entry] : run.at("estimators").items()) {
     if (!entry.contains("blocks")) continue;  // the run ended before the files were created
-    const EstimatorTables& tables = estimators.emplace_back(folder, name, entry);
+    const EstimatorTables& tables = estimators.emplace_back(folder, name, entry, rows);
     for (const CsvColumns* table : {&tables.estimates, &tables.innovations}) {
       const std::vector<Timestamp> more = table->Times();
       timestamps.insert(timestamps.end(), more.begin(), more.end());
     }
   }
   if (timestamps.empty() || estimators.empty()) return {};
-  const RunTimes times(std::move(timestamps), pool);
+  const RunTimes times(std::move(timestamps), rows.origin, pool);
   const Json columns = ReadJsonFile(folder / "columns.json");
-  // The page of an incomplete run shows the measurements of the last frames.
-  const bool is_complete = run.value("status", "ok") == "ok";
+  // The page of a run that failed or was stopped shows the measurements of the last frames.
+  const bool is_complete = rows.are_growing() || run.value("status", "ok") == "ok";
+  const CsvColumns implied(folder / "implied_states.csv", rows.last);
   Json data = {{"t", times.column()},
                {"t0", Seconds(times.origin())},
                {"outcomes", OutcomeList()},
                {"truth", TruthData(truth, times, pool)},
-               {"implied", ImpliedData(CsvColumns(folder / "implied_states.csv"), times, pool)},
+               {"implied", ImpliedData(implied, times, pool)},
                {"segments", SegmentData(config, estimators, times)},
                {"conclusions", run.value("conclusions", Json::array())}};
   Json& list = data["estimators"] = Json::array();

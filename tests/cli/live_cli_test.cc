@@ -48,7 +48,7 @@ TEST_F(LiveCli, NamesAPortInUseAndLeavesNoFolder) {
   EXPECT_EQ(outcome.code, 73);
   EXPECT_TRUE(Contains(outcome.err, "127.0.0.1:" + port + ": the port cannot be opened"))
       << outcome.err;
-  EXPECT_TRUE(Contains(outcome.err, "choose another port")) << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err, "0, which selects a free port")) << outcome.err;
   EXPECT_FALSE(Exists("run.partial"));
 }
 

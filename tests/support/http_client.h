@@ -52,7 +52,7 @@ class HttpClient {
     while (text.empty() || received_.find(text) == received_.npos) {
       pollfd readable{socket_, POLLIN, 0};
       if (std::chrono::steady_clock::now() > end || ::poll(&readable, 1, 10'000) <= 0) {
-        ADD_FAILURE() << "no '" << text << "' in " << received_.substr(0, 1000);
+        ADD_FAILURE() << "no '" << text << "' in " << received_.substr(0, 200);
         break;
       }
       const ssize_t size = ::recv(socket_, buffer, sizeof buffer, 0);

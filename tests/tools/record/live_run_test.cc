@@ -84,7 +84,7 @@ TEST(LiveRun, SendsTheRowsSoFarAndThenTheReport) {
   EXPECT_EQ(RowsOf(so_far, First(ekf.At("nees")).At("v")), 30);
   // Every other frame contains the disparity.
   EXPECT_EQ(RowsOf(so_far, First(ekf.At("innovations")).At("t")), 15);
-  EXPECT_EQ(ekf.At("counts").At("accepted:stereo").Number(), 15);
+  EXPECT_EQ(ekf.At("counts").At("accepted:disparity").Number(), 15);
   EXPECT_FALSE(ekf.Find("verdict"));
 
   const std::string& text = client->ReceiveUntil("");

@@ -357,7 +357,7 @@ class PageTest(unittest.TestCase):
         for text in ("disparity", "stereo", "\u03c3 1 px", "target.depth", "template"):
             self.assertTrue(any(text in shown for shown in texts), texts)
         boxes = self.script("""
-            return [...document.querySelectorAll('.drawing .box')].map(box => {
+            return [...document.querySelector('.drawing').querySelectorAll('.box')].map(box => {
               const {x, y, width, height} = box.getBBox();
               return [x, y, x + width, y + height];
             });""")

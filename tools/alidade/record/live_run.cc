@@ -6,6 +6,7 @@
 
 #include "alidade/base/text.h"
 #include "alidade/io/output_folder.h"
+#include "alidade/io/read_file.h"
 #include "alidade/record/column_tables.h"
 #include "alidade/record/estimator_files.h"
 #include "alidade/record/run_json.h"
@@ -114,11 +115,12 @@ void LiveRun::OnFrame(const SourceFrame& frame) {
 }
 
 void LiveRun::Finish() {
-  const Json live = {{"dropped", impl_->server.dropped()},
-                     {"report", (impl_->folder / "report.html").string()}};
-  // The links to the files of the folder would not work without the server.
-  const Json facts = {{"live", live}, {"files", Json::array()}};
-  impl_->server.Finish(internal::FolderDataText(impl_->folder, facts));
+  const std::filesystem::path report = impl_->folder / "report.html";
+  const Json live = {{"dropped", impl_->server.dropped()}, {"report", report.string()}};
+  const std::string page = internal::ReadFile(report, [&](ExitCode code, int) {
+    throw Error(code, ErrorLine(Place{report.string()}, {}, "the page cannot be read"));
+  });
+  impl_->server.Finish(internal::LiveDataOf(page, live));
 }
 
 std::string LiveRun::address() const {

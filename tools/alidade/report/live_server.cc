@@ -218,6 +218,8 @@ struct LiveServer::Impl {
   /// Sends an update to each browser that has received the previous one, if there is new data.
   void SendUpdate();
   void Finish(const std::string& data);
+  /// Closes all connections. Must be called after the thread has ended.
+  void CloseAll();
 
   asio::io_context context{1};
   tcp::acceptor acceptor{context};
@@ -239,10 +241,10 @@ LiveServer::Impl::Impl(std::uint16_t port, Content content) : hub{std::move(cont
   if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
   if (!error) opened_port = acceptor.local_endpoint(error).port();
   if (!error) return;
-  throw Error(ExitCode::kCannotCreate, ErrorLine({}, "127.0.0.1:" + std::to_string(port),
-                                                 "the port cannot be opened: " + error.message(),
-                                                 "a free port from 1024 to 65535",
-                                                 "choose another port; 0 selects a free one"));
+  throw Error(ExitCode::kCannotCreate,
+              ErrorLine({}, "127.0.0.1:" + std::to_string(port),
+                        "the port cannot be opened: " + error.message(),
+                        "a free port from 1024 to 65535, or 0, which selects a free port"));
 }
 
 void LiveServer::Impl::Accept() {
@@ -301,14 +303,18 @@ void LiveServer::Impl::Finish(const std::string& data) {
   if (hub.connections.empty()) context.stop();
 }
 
+void LiveServer::Impl::CloseAll() {
+  hub.on_empty = {};
+  for (const auto& connection : std::set(hub.connections)) connection->Close();
+}
+
 LiveServer::LiveServer(std::uint16_t port, Content content)
     : impl_(std::make_unique<Impl>(port, std::move(content))) {}
 
 LiveServer::~LiveServer() {
   impl_->context.stop();
   if (impl_->thread.joinable()) impl_->thread.join();
-  impl_->hub.on_empty = {};
-  impl_->hub.connections.clear();
+  impl_->CloseAll();
 }
 
 void LiveServer::Start() {
@@ -329,6 +335,7 @@ void LiveServer::Finish(const std::string& data) {
   if (!impl_->thread.joinable()) return;
   asio::post(impl_->context, [this, &data] { impl_->Finish(data); });
   impl_->thread.join();
+  impl_->CloseAll();
 }
 
 std::uint16_t LiveServer::port() const { return impl_->opened_port; }

@@ -157,28 +157,19 @@ Json DataOf(const Folder& folder, internal::ColumnPool& pool) try {
   internal::FailFile(folder.path, 0, std::string("a JSON file is invalid (") + error.what() + ')');
 }
 
-/// Returns the folder at `path`. Error: kInputMissing if the folder contains no results.
-Folder ExistingFolder(const fs::path& path) {
-  Folder folder(path);
-  if (!folder.main().is_null()) return folder;
-  throw Error(ExitCode::kInputMissing,
-              ErrorLine(Place{path.string()}, {},
-                        "the folder has none of run.json, compare.json, sweep.json and bundle.json",
-                        "a folder that `alidade run`, `compare`, `sweep` or `bundle` has written"));
-}
-
 }  // namespace
 
-std::string internal::FolderDataText(const fs::path& path, const Json& facts) {
-  ColumnPool pool;
-  Json data = DataOf(ExistingFolder(path), pool);
-  data.update(facts);
-  return DataText(data, pool);
-}
-
 std::string ReportPage(const fs::path& path) {
+  const Folder folder(path);
+  if (folder.main().is_null()) {
+    throw Error(
+        ExitCode::kInputMissing,
+        ErrorLine(Place{path.string()}, {},
+                  "the folder has none of run.json, compare.json, sweep.json and bundle.json",
+                  "a folder that `alidade run`, `compare`, `sweep` or `bundle` has written"));
+  }
   internal::ColumnPool pool;
-  return internal::PageText(DataOf(ExistingFolder(path), pool), pool);
+  return internal::PageText(DataOf(folder, pool), pool);
 }
 
 }  // namespace alidade

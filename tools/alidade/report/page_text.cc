@@ -110,6 +110,15 @@ std::string PageText(const Json& data, const ColumnPool& pool) {
                                 {"data", ScriptEscaped(DataText(data, pool))}});
 }
 
+std::string LiveDataOf(const std::string& page, const Json& live) {
+  constexpr std::string_view kBegin = R"(<script type="application/json" id="data">{)";
+  const std::size_t begin = page.find(kBegin);
+  ALIDADE_EXPECTS(begin != page.npos);
+  const std::size_t content = begin + kBegin.size();
+  return "{\"live\":" + live.dump() + ',' +
+         page.substr(content, page.find("</script>", content) - content);
+}
+
 void WritePage(const OutputFolder& folder) {
   folder.Write("report.html", ReportPage(folder.partial()));
 }

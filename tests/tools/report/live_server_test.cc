@@ -124,7 +124,7 @@ TEST(LiveServer, DoesNotUpdateAPageThatNobodyReads) {
 TEST(LiveServer, SpacesExpensiveUpdates) {
   std::atomic<int> updates = 0;
   LiveServer server(0, {[] { return ""; },
-                        [&] {  // needs 20 ms of CPU time, so the next update is 1 s later
+                        [&] {  // needs 20 ms of CPU time, so the next update is 2 s later
                           timespec time{};
                           clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
                           const auto since = [&, start = time] {
@@ -140,7 +140,7 @@ TEST(LiveServer, SpacesExpensiveUpdates) {
   HttpClient client(server.port());
   client.Request("GET", "/events");
   client.ReceiveUntil("data: 1\n\n");
-  std::this_thread::sleep_for(milliseconds(900));
+  std::this_thread::sleep_for(milliseconds(1500));
   EXPECT_EQ(updates, 1);
 }
 

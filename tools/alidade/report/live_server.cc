@@ -35,7 +35,7 @@ using std::chrono::steady_clock;
 using tcp = asio::ip::tcp;
 
 constexpr std::chrono::milliseconds kMinInterval{100};
-constexpr double kMaxShare = 0.02;  // of the time of one core
+constexpr double kMaxShare = 0.01;  // of the time of one core
 constexpr std::chrono::seconds kRequestTimeout{10};
 constexpr std::chrono::seconds kFinishTimeout{2};
 constexpr std::size_t kMaxConnections = 16;

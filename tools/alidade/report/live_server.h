@@ -12,9 +12,9 @@ namespace alidade::internal {
 /// and refuses requests whose Host is not this computer. `/` is the page, `/events` is a stream of
 /// server-sent events with updates of its data. The server has one thread.
 ///
-/// Updates are sent at most 10 times a second. After an update the server waits at least 50 times
-/// the CPU time that its thread has needed since the update before. The thread thus needs at most
-/// 2 % of the time of one core. An update that a browser cannot receive yet is dropped and counted.
+/// Updates are sent at most 10 times a second. After an update the server waits at least 100
+/// times the CPU time that its thread has needed since the update before. The thread thus needs at
+/// most 1 % of the time of one core. An update that a browser cannot receive yet is dropped and counted.
 class LiveServer {
  public:
   /// Texts that the server sends. Both are called on its thread. If a function throws an Error, the

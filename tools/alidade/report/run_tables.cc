@@ -43,7 +43,7 @@ EstimatorTables::EstimatorTables(const std::filesystem::path& folder, const std:
       estimates(folder / name / "estimates.csv", rows.last),
       errors(folder / name / "errors.csv", rows.last),
       innovations(folder / name / "innovations.csv", rows.last),
-      gains(folder / name / "gains.csv", rows.last),
+      gains(rows.are_growing() ? std::filesystem::path() : folder / name / "gains.csv"),
       landmarks(folder / name / "landmarks.csv"),
       events(folder / name / "events.csv"),
       final_covariance(folder / name / "final_covariance.csv") {

@@ -24,7 +24,7 @@ struct RunRows {
 /// Files of one estimator in a run folder.
 struct EstimatorTables {
   /// The last rows of `estimates` and `errors` have the same timestamps, also while the run writes
-  /// these files. The covariances of the poses of a run that is not finished are omitted.
+  /// these files. Gains and covariances of the poses of a run that is not finished are omitted.
   EstimatorTables(const std::filesystem::path& folder, const std::string& estimator,
                   const Json& run_entry, const RunRows& rows);
 

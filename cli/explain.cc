@@ -11,13 +11,26 @@
 namespace alidade::cli {
 namespace {
 
-constexpr const char* kExplainFooter = R"(Example:
+constexpr const char* kExplainFooter = R"(Examples:
+  alidade explain config.yaml -o model.html
   alidade explain examples/05_depth_principled/config.yaml --set estimators.ekf.fuse=per_sensor)";
 
-ExitCode ExplainConfig(const Input& input) {
-  const Config config = input.Load();
-  const PluginHost host = input.Host(config);
-  PrintText(Explain(config, BuildExperiment(config, host)));
+struct ExplainArguments {
+  Input input;
+  std::string page;  ///< file of the page; "": print the text
+};
+
+ExitCode ExplainConfig(const ExplainArguments& arguments) {
+  const Config config = arguments.input.Load();
+  const PluginHost host = arguments.input.Host(config);
+  const Experiment experiment = BuildExperiment(config, host);
+  if (arguments.page.empty()) {
+    PrintText(Explain(config, experiment));
+    return ExitCode::kOk;
+  }
+  ProtectInputs(arguments.page, config.inputs());
+  WritePageFile(arguments.page, ExplainPage(config, experiment, host));
+  Print("report   " + arguments.page + '\n');
   return ExitCode::kOk;
 }
 
@@ -26,10 +39,16 @@ ExitCode ExplainConfig(const Input& input) {
 void AddExplain(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand(
       "explain", "Describe a config: state, models, roles, unobservable directions");
-  const auto input = std::make_shared<Input>();
-  input->AddTo(command);
+  const auto arguments = std::make_shared<ExplainArguments>();
+  arguments->input.AddTo(command);
+  command
+      .add_option("-o,--output", arguments->page,
+                  "page to write instead of the text, with a drawing of the model")
+      ->option_text("FILE.html")
+      ->check(IsNonEmpty);
   command.footer(kExplainFooter);
-  command.callback([&action, input] { action = [input] { return ExplainConfig(*input); }; });
+  command.callback(
+      [&action, arguments] { action = [arguments] { return ExplainConfig(*arguments); }; });
 }
 
 }  // namespace alidade::cli

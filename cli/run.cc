@@ -6,11 +6,13 @@
 #include <memory>
 
 #include "alidade/record/follower.h"
+#include "alidade/record/live_run.h"
 #include "alidade/record/recorder.h"
 #include "alidade/record/run_viewer.h"
 #include "alidade/replay/run_inputs.h"
 #include "command.h"
 #include "console.h"
+#include "live_port.h"
 #include "run_report.h"
 #include "video_name.h"
 
@@ -35,7 +37,7 @@ struct RunArguments {
   std::optional<std::uint64_t> seed;
   bool force = false, quiet = false, verbose = false, covariances = false, all = false;
   bool follow = false, view = false, strict = false;
-  std::string video;
+  std::string video, live;
 };
 
 /// Returns the text on standard output after a run.
@@ -62,6 +64,23 @@ std::unique_ptr<RunViewer> ViewerOf(const RunArguments& arguments, const Experim
   return viewer;
 }
 
+/// Returns the server of the live page, or null if it is not requested.
+std::unique_ptr<LiveRun> LiveRunOf(const RunArguments& arguments, const Config& config,
+                                   const std::filesystem::path& folder) {
+  if (arguments.live.empty()) return nullptr;
+  auto live = std::make_unique<LiveRun>(PortOf(arguments.live), folder, config);
+  if (!arguments.quiet) PrintNote("live page at " + live->address());
+  return live;
+}
+
+/// Sends the report to the browsers that show the live page, and stops its server.
+void FinishLive(LiveRun& live, const std::filesystem::path& folder, bool quiet) {
+  live.Finish();
+  if (quiet) return;
+  PrintNote("the live page ended with " + std::to_string(live.dropped()) +
+            " dropped updates; its report is " + (folder / "report.html").string());
+}
+
 /// Returns the options that affect the bytes of the run folder.
 std::vector<std::string> ArgumentsOf(const RunArguments& arguments) {
   std::vector<std::string> list = {"run"};
@@ -73,6 +92,7 @@ Recorder::Options RecordOf(const RunArguments& arguments, const Config& config,
                            const std::filesystem::path& folder, const PluginHost& host) {
   Recorder::Options record{folder, arguments.force, arguments.command};
   record.covariances = arguments.covariances;
+  if (!arguments.live.empty()) record.max_delay = LiveRun::kMaxDelay;
   record.plugins = internal::HashFiles(internal::FindUsedPlugins({config}, host));
   record.inputs =
       arguments.input.InputsText(config, ArgumentsOf(arguments), {config}, record.plugins);
@@ -92,6 +112,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   StopOnSignals();  // BuildExperiment may wait for a pipe, which a signal must interrupt
   Experiment experiment = BuildExperiment(config, host);
   const std::unique_ptr<RunViewer> viewer = ViewerOf(arguments, experiment, config);
+  const std::unique_ptr<LiveRun> live = LiveRunOf(arguments, config, output.folder);
   Recorder recorder(RecordOf(arguments, config, output.folder, host), config);
   if (!arguments.quiet) ReportOutput(output);
 
@@ -102,6 +123,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   Follower follower(Print);
   if (arguments.follow) options.observers.push_back(&follower);
   if (viewer) options.observers.push_back(viewer.get());
+  if (live) options.observers.push_back(live.get());
   std::int64_t total_frames = -1;
   options.progress = [&](std::int64_t done, std::int64_t total) {
     total_frames = total;
@@ -117,6 +139,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (result.frames == 0 && result.status == RunStatus::kFailed)
     throw Error(result.code, result.reason);
   recorder.Finish(result);
+  if (live) FinishLive(*live, output.folder, arguments.quiet);
   if (viewer) viewer->Close();
   if (!arguments.quiet && !arguments.follow) {
     PrintText(Summary(arguments, report, result, recorder));
@@ -158,6 +181,11 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
       ->check(IsAvi);
   command.add_flag("--view", arguments->view,
                    "show the annotated images in a window during the run");
+  command
+      .add_option("--live", arguments->live,
+                  "serve the page of the run at 127.0.0.1 during the run; 0: any free port")
+      ->option_text("PORT")
+      ->check(IsLivePort);
   command.add_flag("--covariances", arguments->covariances,
                    "write the covariance of every estimate, for `alidade compare`");
   command.footer(kRunFooter);

@@ -63,6 +63,82 @@ TEST_F(ExplainCli, TellsWhichNoiseTheConfigGivesAsACovariance) {
   }
 }
 
+TEST_F(ExplainCli, TellsTheNoiseAtThePrior) {
+  // Depth 0.3 m and inverse distance 3.3 1/m; sigma of 1/scale: 2 sigma_px / template_px (0.99)^3.
+  // Q = G G' with G = (dt^2 / 2, dt) and an acceleration of 1 m/s^2.
+  const Outcome prior = Call({"explain", "config.yaml"});
+  for (const char* part : {"stereo_disparity  1 px ", "scale_2d          0.006469 ",
+                           "    Q of target for a step of 0.1 s, as sigma: target.depth 0.005 m, "
+                           "target.depth_rate 0.1 m/s\n",
+                           "template.inverse_distance  vector    1     1/m "}) {
+    EXPECT_TRUE(Contains(prior.out, part)) << part << '\n' << prior.out;
+  }
+  const Outcome rate = Call({"explain", "config.yaml", "--set", "source.rate_hz=50", "--set",
+                             "sensors.stereo.sigma_px=0.25"});
+  EXPECT_TRUE(Contains(rate.out,
+                       "step of 0.02 s, as sigma: target.depth 0.0002 m, "
+                       "target.depth_rate 0.02 m/s\n"))
+      << rate.out << rate.err;
+  EXPECT_TRUE(Contains(rate.out, "stereo_disparity  0.25 px ")) << rate.out;
+}
+
+TEST_F(ExplainCli, RoundsNumbers) {
+  const Outcome outcome =
+      Call({"explain", "config.yaml", "--set",
+            "state.target.initial.depth={mean: 0.25132741228718347, sigma: 0.1}"});
+  EXPECT_TRUE(Contains(outcome.out, " 0.2513 +- 0.1\n")) << outcome.out;
+}
+
+std::size_t Count(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t i = text.find(part); i != text.npos; i = text.find(part, i + 1)) ++count;
+  return count;
+}
+
+TEST_F(ExplainCli, DescribesEqualPartsOfEstimatorsOnce) {
+  const Outcome outcome =
+      Call({"explain", "config.yaml", "--set", "estimators.tight={type: ekf, gate: 0.9}", "--set",
+            "estimators.alone={type: ukf, sensors: [stereo, scale], "
+            "overrides: {sensors: {scale: {sigma_px: 2}}}}"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  for (const char* part : {"\nestimators ekf (ekf), tight (ekf)\n", "\nestimator alone (ukf)\n",
+                           "  state, motion, effects on blocks: as estimator ekf\n",
+                           "  options of tight that differ from those of ekf\n    gate  0.9: ",
+                           "\ntype ekf supports\n", "\ntype ukf supports\n"}) {
+    EXPECT_EQ(Count(outcome.out, part), 1) << part << '\n' << outcome.out;
+  }
+  EXPECT_EQ(Count(outcome.out, "  motion\n"), 1) << outcome.out;
+  EXPECT_EQ(Count(outcome.out, "  sensors\n"), 2) << outcome.out;
+}
+
+TEST_F(ExplainCli, NamesTheBlocksOfTheRejectionRecovery) {
+  const Outcome reset = Call({"explain", "config.yaml"});
+  for (const char* part :
+       {"recovery of stereo  reset target.depth from the measurement\n",
+        "recovery of scale   reset template.inverse_distance from the measurement, or widen "
+        "target.depth if it explains the rejections better\n"}) {
+    EXPECT_TRUE(Contains(reset.out, part)) << part << '\n' << reset.out;
+  }
+  const Outcome inflate = Call(
+      {"explain", "config.yaml", "--set", "estimators.ekf.rejection_recovery={action: inflate}"});
+  EXPECT_TRUE(Contains(inflate.out,
+                       "recovery of scale   multiply the sigma of target.depth, "
+                       "template.inverse_distance by 10\n"))
+      << inflate.out;
+}
+
+TEST_F(ExplainCli, WritesAPage) {
+  const Outcome outcome = Call({"explain", "config.yaml", "-o", "model.html"});
+  EXPECT_EQ(outcome.out, "report   model.html\n") << outcome.err;
+  const std::string page = Read("model.html");
+  for (const char* part : {R"("noise":"1 px","effects":[["target.depth","corrects"]])",
+                           R"("noise":["target.depth 0.005 m","target.depth_rate 0.1 m/s"])",
+                           R"(["sensors.stereo.focal_px","400","px",")"}) {
+    EXPECT_TRUE(Contains(page, part)) << part;
+  }
+  EXPECT_EQ(Call({"explain", "config.yaml", "-o", "config.yaml"}).code, 73);
+}
+
 TEST_F(ExplainCli, TellsTheOptionsOfEachTypeOfEstimator) {
   const Outcome ekf =
       Call({"explain", "config.yaml", "--set", "estimators.ekf.jacobian=first_estimate", "--set",

@@ -12,7 +12,6 @@ namespace alidade::internal {
 namespace {
 
 constexpr std::size_t kBufferSize = 1 << 16;
-constexpr std::chrono::seconds kMaxDelay{1};
 
 std::string Reason(int error_number) { return std::generic_category().message(error_number); }
 
@@ -31,7 +30,8 @@ void FailIo(const std::string& path, const char* verb, int error_number) {
       ErrorLine(Place{path}, {}, std::string("cannot ") + verb + ": " + Reason(error_number)));
 }
 
-OutputFile::OutputFile(std::filesystem::path file, Mode mode) : path_(std::move(file)) {
+OutputFile::OutputFile(std::filesystem::path file, Mode mode, std::chrono::milliseconds max_delay)
+    : path_(std::move(file)), max_delay_(max_delay) {
   const int open_flag = mode == Mode::kAppend ? O_APPEND : O_TRUNC;
   fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | open_flag, 0666);
   if (fd_ < 0) FailCreate(path_.string(), errno);
@@ -47,7 +47,7 @@ OutputFile::~OutputFile() {
 
 void OutputFile::Write(std::string_view text) {
   buffer_ += text;
-  const bool is_due = std::chrono::steady_clock::now() - flushed_ >= kMaxDelay;
+  const bool is_due = std::chrono::steady_clock::now() - flushed_ >= max_delay_;
   if (is_due || buffer_.size() >= kBufferSize) Flush();
 }
 

@@ -11,13 +11,16 @@
 namespace alidade::internal {
 
 /// File that is written sequentially and reports every write error. Write() appends to a buffer. It
-/// flushes the buffer if the buffer is full or the last flush is at least one second old.
+/// flushes the buffer if the buffer is full or the last flush is at least `max_delay` old.
 class OutputFile {
  public:
   enum class Mode { kReplace, kAppend };
 
+  static constexpr std::chrono::milliseconds kMaxDelay{1000};
+
   /// Creates `file`, or opens an existing file. Errors: kCannotCreate, kIo.
-  explicit OutputFile(std::filesystem::path file, Mode mode = Mode::kReplace);
+  explicit OutputFile(std::filesystem::path file, Mode mode = Mode::kReplace,
+                      std::chrono::milliseconds max_delay = kMaxDelay);
   /// Closes the file if Close() was not called. Does not report errors.
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
@@ -34,6 +37,7 @@ class OutputFile {
  private:
   std::filesystem::path path_;
   std::string buffer_;
+  std::chrono::milliseconds max_delay_;
   std::chrono::steady_clock::time_point flushed_ = std::chrono::steady_clock::now();
   int fd_ = -1;
   int error_ = 0;  ///< errno of the write that failed

@@ -170,7 +170,7 @@ fs::path OutputFolder::Add(const std::string& name) const {
 }
 
 std::unique_ptr<OutputFile> OutputFolder::Create(const std::string& name) const {
-  return std::make_unique<OutputFile>(Add(name));
+  return std::make_unique<OutputFile>(Add(name), OutputFile::Mode::kReplace, max_delay_);
 }
 
 std::unique_ptr<OutputFile> OutputFolder::Append(const std::string& name) const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -31,6 +32,8 @@ class OutputFolder {
   /// a folder and all its future contents. Creates the parent folders. Returns the path of the
   /// file. Errors: kCannotCreate, kIo.
   std::filesystem::path Add(const std::string& name) const;
+  /// Sets the longest time after which a written row reaches a file that is created later.
+  void SetMaxDelay(std::chrono::milliseconds max_delay) { max_delay_ = max_delay; }
   /// Creates or replaces a file. Errors: kCannotCreate, kIo.
   std::unique_ptr<OutputFile> Create(const std::string& name) const;
   /// Opens a file to append to it. Errors: kCannotCreate, kIo.
@@ -58,6 +61,7 @@ class OutputFolder {
   std::filesystem::path target_, partial_;
   int descriptor_ = -1;  ///< descriptor of `NAME.partial`
   bool force_, is_retained_ = false;
+  std::chrono::milliseconds max_delay_ = OutputFile::kMaxDelay;
 };
 
 /// Returns the path of an incomplete folder: `NAME.partial`.

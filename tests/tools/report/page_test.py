@@ -163,6 +163,13 @@ class PageCase(unittest.TestCase):
 
     def expect_sound(self):
         """Expects a page without errors, requests, empty canvases and sideways scrolling."""
+        self.expect_no_errors()
+        colours = self.script(COUNT_COLOURS)
+        self.assertGreaterEqual(len(colours), 3)
+        self.assertGreaterEqual(min(colours), 3, colours)
+
+    def expect_no_errors(self):
+        """Expects a page without errors, requests and sideways scrolling."""
         self.assertEqual(self.browser.get_log("browser"), [])
         urls = []
         for entry in self.browser.get_log("performance"):
@@ -172,9 +179,6 @@ class PageCase(unittest.TestCase):
         outside = [url for url in urls if not url.startswith(("file:", "data:"))]
         self.assertEqual(outside, [])
         self.assertEqual(len([url for url in urls if url.startswith("file:")]), 1)
-        colours = self.script(COUNT_COLOURS)
-        self.assertGreaterEqual(len(colours), 3)
-        self.assertGreaterEqual(min(colours), 3, colours)
         self.assertLessEqual(self.script("return document.documentElement.scrollWidth"),
                              self.script("return innerWidth"))
         self.assertNotIn("NaN", self.script("return document.body.innerText"))
@@ -706,6 +710,128 @@ class Hostile(PageCase):
         self.assertIsNone(self.script("return window.attacked || null"))
         text = self.script("return document.getElementById('failure').innerText")
         self.assertIn(row, text)
+
+    def start_live(self, name, config, *arguments):
+        """Starts a run with a live page and a pipe as the source. Returns process, pipe, address."""
+        pipe = self.root / (name + ".pipe")
+        os.mkfifo(pipe)
+        process = subprocess.Popen(
+            [PROGRAM, "run", config, "--set", f"source.path={pipe}", "--live", "0", "-o",
+             self.root / name, *arguments], cwd=self.root, text=True, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE)
+        writer = open(pipe, "w", buffering=1)
+        writer.write("t_s,disparity_px\n")
+        line = process.stderr.readline()
+        self.assertRegex(line, r"live page at http://127\.0\.0\.1:[0-9]+/")
+        return process, writer, line.split(" at ")[1].strip()
+
+    def wait_for(self, condition, what):
+        for _ in range(200):
+            if self.script("return Boolean(" + condition + ")"):
+                return
+            time.sleep(0.05)
+        self.fail(what + ": " + self.script("return document.body.innerText")[:500])
+
+    def test_live_run(self):
+        (self.root / "live.yaml").write_text(BROKEN)
+        process, writer, address = self.start_live("live", self.root / "live.yaml")
+        rows = (f"{i / 10:.1f},{86 + math.sin(i) / 2:.3f}\n" for i in range(1, 400))
+        for _ in range(10):
+            writer.write(next(rows))
+            time.sleep(0.02)
+        self.browser.get_log("browser")
+        self.browser.get(address)
+        count = "(alidadeReport.run ? alidadeReport.columnOf(alidadeReport.run.t).length : 0)"
+        shown = []
+        for target in (15, 40, 80):
+            while not shown or shown[-1] < target:
+                writer.write(next(rows))
+                time.sleep(0.02)
+                shown.append(self.script("return " + count))
+            # The pixels of the plot change, although the plot is not built again.
+            shown_plot = self.script("""
+                const plot = [...alidadeReport.plots].find(p => p.spec.label === 'depth');
+                window.firstPlot = window.firstPlot || plot;
+                plot.draw();
+                return plot === window.firstPlot && plot.layers[1].x.length;""")
+            self.assertEqual(shown_plot, self.script("return " + count))
+        self.assertEqual(shown, sorted(shown))
+        self.assertRegex(self.script("return document.querySelector('.live').innerText"),
+                         "^Live: the figures show the last 1.?000 rows")
+        self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, ".chip"), [])
+        writer.close()
+        self.wait_for("document.querySelector('.live').innerText.includes('The run has ended')",
+                      "the page does not show the end")
+        self.assertIn(str(self.root / "live/report.html"),
+                      self.script("return document.querySelector('.live').innerText"))
+        self.assertTrue(self.browser.find_elements(By.CSS_SELECTOR, ".chip"))
+        out, err = process.communicate(timeout=30)
+        self.assertEqual(process.returncode, 0, err)
+        self.assertIn("live page ended with 0 dropped updates", err)
+        self.browser.execute_script(DRAW_ALL)
+        self.assertEqual(self.browser.get_log("browser"), [])
+
+    def test_a_killed_live_run(self):
+        (self.root / "live.yaml").write_text(BROKEN)
+        process, writer, address = self.start_live("killed", self.root / "live.yaml")
+        for i in range(10):
+            writer.write(f"{i / 10:.1f},86\n")
+        self.browser.get(address)
+        process.kill()
+        process.communicate()
+        writer.close()
+        self.wait_for("document.querySelector('.live').innerText.includes('program has ended')",
+                      "the page does not show that the program is gone")
+
+    def open_explanation(self, name, config, *arguments):
+        page = self.root / (name + ".html")
+        written = self.alidade("explain", config, "-o", page, *arguments)
+        self.assertEqual(written.stdout, f"report   {page}\n", written.stderr)
+        self.open_page(page)
+        self.expect_no_errors()
+
+    def test_explanation(self):
+        self.open_explanation("explained", "05_depth_principled/compare.yaml")
+        texts = self.script(
+            "return [...document.querySelectorAll('.drawing text')].map(t => t.textContent)")
+        for text in ("disparity", "stereo", "\u03c3 1 px", "target.depth", "template"):
+            self.assertTrue(any(text in shown for shown in texts), texts)
+        boxes = self.script("""
+            return [...document.querySelector('.drawing').querySelectorAll('.box')].map(box => {
+              const {x, y, width, height} = box.getBBox();
+              return [x, y, x + width, y + height];
+            });""")
+        for i, (left, top, right, bottom) in enumerate(boxes):
+            for l, t, r, b in boxes[:i]:
+                self.assertFalse(left < r and l < right and top < b and t < bottom)
+        self.assertGreater(len(self.browser.find_elements(By.CSS_SELECTOR, ".drawing .link")), 4)
+        keys = self.script("return document.getElementById('keys').innerText")
+        self.assertIn("sensors.stereo.focal_px", keys)
+
+    def test_explanations_of_other_models(self):
+        for example in ("10_slam_scene", "08_slam_odometry"):
+            if (EXAMPLES / example / "config.yaml").exists():
+                self.open_explanation(example, example + "/config.yaml")
+
+    def test_hostile_texts_are_explained(self):
+        (self.root / "data.csv").write_text("t_s,disparity_px\n0,86\n")
+        config = BROKEN.replace("stream: disparity", "stream: " + json.dumps(HOSTILE))
+        config = config.replace("{disparity: disparity_px}",
+                                "{" + json.dumps(HOSTILE) + ": disparity_px}")
+        file = self.root / "hostile_names.yaml"
+        file.write_text(config + "title: " + json.dumps(HOSTILE) + "\n")
+        self.open_explanation("hostile_names", file)
+        self.assertIsNone(self.script("return window.attacked || null"))
+        self.assertEqual(self.script("return document.images.length"), 0)
+        self.assertIn(HOSTILE, self.script("return document.querySelector('.drawing').textContent"))
+
+    def test_narrow_explanation(self):
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+            "width": 390, "height": 900, "deviceScaleFactor": 1, "mobile": False})
+        try:
+            self.open_explanation("narrow", "10_slam_scene/config.yaml")
+        finally:
+            self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
     def test_narrow_and_dark(self):
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {

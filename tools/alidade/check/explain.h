@@ -12,4 +12,9 @@ namespace alidade {
 /// lists the unobservable directions of the state, the options and the capabilities.
 std::string Explain(const Config& config, const Experiment& experiment);
 
+/// Returns the explanation as a page: one HTML file that needs no network. It also contains a
+/// drawing of streams, sensors, blocks and motion models, and the meaning of each key.
+/// `host` provides the models of the experiment.
+std::string ExplainPage(const Config& config, const Experiment& experiment, const PluginHost& host);
+
 }  // namespace alidade

@@ -39,34 +39,62 @@ std::string FuseText(Fuse fuse, const Problem& problem) {
   return "per_measurement: one update for each measurement, in the order " + Join(names);
 }
 
-std::string RejectionRecoveryText(const EkfOptions& options, const Problem& problem) {
-  const auto corrects = [&](const RoleBinding& role) {
-    return role.block >= 0 && role.mode == RoleMode::kEstimate &&
-           problem.layout[role.block].status == BlockStatus::kEstimated;
-  };
+bool IsCorrected(const RoleBinding& role, const Problem& problem) {
+  return role.block >= 0 && role.mode == RoleMode::kEstimate &&
+         problem.layout[role.block].status == BlockStatus::kEstimated;
+}
+
+/// Returns the action of the rejection recovery for a sensor, with the names of its blocks. Returns
+/// "" if the sensor does not correct a block.
+std::string RecoveryAction(RejectionRecovery recovery, const SensorBinding& sensor,
+                           const Problem& problem) {
+  const int determined = sensor.model->inverse().role;  // -1: no inverse model
+  std::string reset;
+  std::vector<std::string> corrected;
+  for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
+    if (!IsCorrected(sensor.roles[i], problem)) continue;
+    const std::string& name = problem.layout[sensor.roles[i].block].name;
+    if (recovery == RejectionRecovery::kReset && static_cast<int>(i) == determined) {
+      reset = "reset " + name + " from the measurement";
+    } else if (std::ranges::find(corrected, name) == corrected.end()) {
+      corrected.push_back(name);
+    }
+  }
+  if (corrected.empty()) return reset;
+  if (recovery == RejectionRecovery::kInflate) {
+    return "multiply the sigma of " + Join(corrected) + " by 10";
+  }
+  const std::string widen = "widen " + Join(corrected, " or ");
+  if (!reset.empty()) return reset + ", or " + widen + " if it explains the rejections better";
+  return corrected.size() == 1 ? widen : widen + ", which explains the rejections best";
+}
+
+/// Appends the condition of the rejection recovery, and its action for each sensor.
+void AppendRecovery(const EkfOptions& options, const Problem& problem, std::vector<TextRow>& rows) {
+  if (options.rejection_recovery == RejectionRecovery::kNone) {
+    rows.push_back({"rejection_recovery", "none"});
+    return;
+  }
+  std::vector<TextRow> actions;
   std::vector<std::string> unaffected;
   for (const SensorBinding& sensor : problem.sensors) {
-    if (std::ranges::none_of(sensor.roles, corrects)) unaffected.push_back(sensor.name);
+    const std::string action = RecoveryAction(options.rejection_recovery, sensor, problem);
+    if (action.empty()) {
+      unaffected.push_back(sensor.name);
+    } else {
+      actions.push_back({"recovery of " + sensor.name, action});
+    }
   }
-  std::string after = " after " + std::to_string(options.rejection_recovery_after) +
-                      " consecutive rejections of a sensor";
+  std::string text = "after " + std::to_string(options.rejection_recovery_after) +
+                     " consecutive rejections of a sensor";
   if (std::isfinite(options.rejection_recovery_after_s)) {
-    after += " or " + NumberText(options.rejection_recovery_after_s) + " s";
+    text += " or " + NumberText(options.rejection_recovery_after_s) + " s";
   }
   if (!unaffected.empty()) {
-    after += "; no effect for sensors that do not correct a block: " + Join(unaffected);
+    text += "; no effect for sensors that do not correct a block: " + Join(unaffected);
   }
-  switch (options.rejection_recovery) {
-    case RejectionRecovery::kReset:
-      return "reset the block that the sensor determines, or widen the block that explains the "
-             "rejections best," +
-             after;
-    case RejectionRecovery::kInflate:
-      return "inflate the covariance of the blocks of the sensor," + after;
-    case RejectionRecovery::kNone:
-      break;
-  }
-  return "none";
+  rows.push_back({"rejection_recovery", text});
+  rows.insert(rows.end(), actions.begin(), actions.end());
 }
 
 std::string LossText(const Problem& problem) {
@@ -81,14 +109,40 @@ std::string LossText(const Problem& problem) {
 
 }  // namespace
 
+std::string CapabilitiesText(const std::string& type) {
+  const EstimatorType* estimator_type = FindEstimatorType(type);
+  if (estimator_type == nullptr) return {};
+  const EstimatorCapabilities& capabilities = estimator_type->capabilities;
+  const auto either = [](bool supported, const char* text, const char* alternative) {
+    return std::string(supported ? text : alternative);
+  };
+  std::string unsupported;
+  const auto add_unsupported = [&](bool supported, const char* feature) {
+    if (!supported) unsupported += (unsupported.empty() ? "" : ", ") + std::string(feature);
+  };
+  add_unsupported(capabilities.consider, "consider blocks and roles");
+  add_unsupported(capabilities.at_measurement, "jacobian_at measurement");
+  add_unsupported(capabilities.from_measurement, "blocks that start from a measurement");
+  add_unsupported(capabilities.recovery, "rejection\n    recovery");
+  add_unsupported(capabilities.landmarks, "landmarks");
+  return either(capabilities.consider,
+                "    blocks estimated, consider (Schmidt) or constant; roles estimate, consider, "
+                "known;\n",
+                "    blocks estimated or constant; roles estimate, known;\n") +
+         "    control inputs; jacobian_at prediction" +
+         either(capabilities.at_measurement, " or measurement", "") +
+         either(capabilities.from_measurement, "; blocks that start from a measurement", "") +
+         ";\n    robust losses" + either(capabilities.landmarks, "; landmarks", "") + '.' +
+         (unsupported.empty() ? "" : "\n    Not supported: " + unsupported + '.') + '\n';
+}
+
 std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec) {
   const Problem& problem = spec.problem;
   std::vector<TextRow> rows;
   if (const EstimatorType* const type = FindEstimatorType(spec.type)) {
     const auto [options, type_rows] = type->describe(entry);
     rows = {{"gate", GateText(options, problem)}, {"fuse", FuseText(options.fuse, problem)}};
-    if (type->capabilities.recovery)
-      rows.push_back({"rejection_recovery", RejectionRecoveryText(options, problem)});
+    if (type->capabilities.recovery) AppendRecovery(options, problem, rows);
     rows.push_back({"max_dt_s", std::isfinite(options.max_dt_s)
                                     ? NumberText(options.max_dt_s)
                                     : "none: a gap of any length is one step"});

@@ -148,6 +148,16 @@ std::string PluginListJson(const PluginHost& host) {
   return internal::JsonText(json);
 }
 
+std::vector<ParamInfo> internal::KeysOf(const PluginHost& host, const std::string& kind,
+                                        const std::string& name) {
+  const EstimatorType* const type = kind == kEstimatorKind ? FindEstimatorType(name) : nullptr;
+  if (type != nullptr) return WithCommonKeys(type->schema());
+  for (const PluginEntry& entry : host.entries()) {
+    if (entry.kind == kind && entry.name == name) return alidade::KeysOf(entry);
+  }
+  return {};
+}
+
 std::string PluginInfo(const PluginHost& host, const std::string& name) {
   std::string text;
   if (const EstimatorType* type = FindEstimatorType(name)) {

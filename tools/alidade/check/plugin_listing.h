@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "alidade/plugin/plugin_host.h"
 
@@ -23,5 +24,14 @@ std::string PluginInfo(const PluginHost& host, const std::string& name);
 /// `unit`, `type`, `range`, `choices`, `when`, `doc`, and `default` unless the parameter is
 /// required). For a built-in estimator, `family`, `citation`, `file` and `describes` are omitted.
 std::string PluginInfoJson(const PluginHost& host, const std::string& name);
+
+namespace internal {
+
+/// Returns the keys of a plugin entry or of a built-in estimator. Returns an empty list if there is
+/// no such entry.
+std::vector<ParamInfo> KeysOf(const PluginHost& host, const std::string& kind,
+                              const std::string& name);
+
+}  // namespace internal
 
 }  // namespace alidade

@@ -39,10 +39,11 @@ class EstimatorFiles {
   /// kCannotCreate.
   void Close(const OutputFolder& folder, RunColumns& run_columns);
   const RecordedEstimator& recorded() const { return recorded_; }
+  /// Returns the description of the files of an estimator, without the number of rows.
+  static RecordedEstimator Describe(const EstimatorSpec& spec);
   const EstimateHistory& history() const { return history_; }
 
  private:
-  static RecordedEstimator Describe(const EstimatorSpec& spec);
   void OpenEstimates(const OutputFolder& folder, RunColumns& run_columns);
   GainLayout AddGains(const Problem& problem);
   void OpenTrajectory(const OutputFolder& folder, const Problem& problem);

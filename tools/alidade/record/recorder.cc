@@ -64,6 +64,7 @@ constexpr std::array<const char*, kFrameParts> kPartNames = {"step", "evaluate",
 Recorder::Impl::Impl(const Options& recorder_options, const Config& config)
     : options(recorder_options), folder(options.folder, options.force) {
   facts.plugins = options.plugins;
+  folder.SetMaxDelay(options.max_delay);
   folder.Write(kRunFile, internal::UnfinishedRunJson("running", ""));
   folder.Write(internal::kResolvedConfig, config.ToYaml());
   if (!options.inputs.empty()) folder.Write(internal::kInputsFile, options.inputs);

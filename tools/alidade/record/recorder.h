@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -30,6 +31,8 @@ class Recorder : public RunObserver {
     std::string inputs = {};   ///< text of inputs.json; "": the file is not written
     /// Plugins that run.json lists: file name -> SHA-256.
     std::multimap<std::string, std::string> plugins = {};
+    /// Longest time between a frame and its rows in the files, if further frames follow.
+    std::chrono::milliseconds max_delay{1000};
   };
   /// Creates `FOLDER.partial`. Error: kCannotCreate if `FOLDER.partial` or `FOLDER` exists and
   /// `force` is false.

@@ -31,9 +31,9 @@ Json JsonOf(const InnovationSeries& series) {
           {"landmark_prior", series.has_landmark_prior}};
 }
 
-/// Returns the entry of one estimator. `recorded` is null if the run ended before the files were
-/// created.
-Json JsonOf(const EstimatorResult& result, const RecordedEstimator* recorded) {
+}  // namespace
+
+Json EstimatorJson(const EstimatorResult& result, const RecordedEstimator* recorded) {
   Json json = {{"type", result.type}, {"kind", ToString(result.kind)}};
   if (!result.accepted_by.empty()) json["accepted_by"] = result.accepted_by;
   if (!result.overrides.empty()) json["overrides"] = result.overrides;
@@ -66,8 +66,6 @@ Json JsonOf(const EstimatorResult& result, const RecordedEstimator* recorded) {
   json["unobservable"] = result.unobservable;
   return json;
 }
-
-}  // namespace
 
 Json FindingsJson(std::span<const Finding> findings) {
   Json list = Json::array();
@@ -114,7 +112,8 @@ std::string RunJson(const RunResult& result, const RunFacts& facts) {
   for (const EstimatorResult& estimator : result.estimators) {
     const auto found = std::ranges::find(facts.recorded, estimator.name, &RecordedEstimator::name);
     const bool is_recorded = found != facts.recorded.end();
-    estimators[estimator.name] = JsonOf(estimator, is_recorded ? &*found : nullptr);
+    // There are no files if the run ended before they were created.
+    estimators[estimator.name] = EstimatorJson(estimator, is_recorded ? &*found : nullptr);
   }
   return JsonText(json);
 }

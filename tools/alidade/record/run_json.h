@@ -25,6 +25,10 @@ struct RunFacts {
 /// Returns the text of `run.json` for an unfinished run. `status` is `running` or `failed`.
 std::string UnfinishedRunJson(const std::string& status, const std::string& reason);
 
+/// Returns the entry of an estimator in `run.json`. `recorded` describes its files; null: there are
+/// no files.
+Json EstimatorJson(const EstimatorResult& result, const RecordedEstimator* recorded);
+
 /// Returns the list of findings as in `run.json`.
 Json FindingsJson(std::span<const Finding> findings);
 

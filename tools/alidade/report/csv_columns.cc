@@ -14,11 +14,12 @@ namespace alidade::internal {
 
 CsvColumns::CsvColumns(const std::filesystem::path& file, const RowSelection& selection)
     : file_(file) {
-  CsvRows table(file);
+  CsvRows table(file, selection.last);
   names_ = table.names();
+  const auto& rows = selection.rows;
   for (std::size_t next = 0; table.Next(); ++total_rows_) {
-    if (selection) {
-      if (next == selection->size() || (*selection)[next] != table.row()) continue;
+    if (rows) {
+      if (next == rows->size() || (*rows)[next] != table.row()) continue;
       ++next;
     }
     lines_.push_back(static_cast<std::uint32_t>(table.row()));
@@ -27,6 +28,17 @@ CsvColumns::CsvColumns(const std::filesystem::path& file, const RowSelection& se
       ends_.push_back(text_.size());
     }
   }
+}
+
+void CsvColumns::Keep(std::size_t first, std::size_t count) {
+  const std::size_t first_cell = first * names_.size();
+  const auto begin = ends_.begin() + static_cast<std::ptrdiff_t>(first_cell);
+  const std::size_t start = first_cell == 0 ? 0 : ends_[first_cell - 1];
+  ends_ = std::vector(begin, begin + static_cast<std::ptrdiff_t>(count * names_.size()));
+  for (std::size_t& end : ends_) end -= start;
+  text_.erase(0, start);
+  const auto line = lines_.begin() + static_cast<std::ptrdiff_t>(first);
+  lines_ = std::vector(line, line + static_cast<std::ptrdiff_t>(count));
 }
 
 std::optional<std::size_t> CsvColumns::Find(std::string_view name) const {

@@ -36,6 +36,8 @@ class CsvColumns {
   std::vector<double> Numbers(std::string_view name) const;
   /// Returns the timestamps of a column. An empty cell becomes kNoTimestamp. Error: kBadData.
   std::vector<Timestamp> Times(std::string_view name = "t_s") const;
+  /// Removes all rows except `count` rows from row `first` on.
+  void Keep(std::size_t first, std::size_t count);
 
  private:
   std::optional<std::size_t> Find(std::string_view name) const;

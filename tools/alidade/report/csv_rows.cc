@@ -9,13 +9,36 @@
 
 namespace alidade::internal {
 
-CsvRows::CsvRows(const std::filesystem::path& file) : file_(file) {
+CsvRows::CsvRows(const std::filesystem::path& file, std::size_t last_rows) : file_(file) {
   std::error_code error;
   if (!std::filesystem::exists(file, error)) return;
   RequireFile(file);
   stream_.open(file, std::ios::binary);
   if (!stream_) FailFile(file, 0, "the file cannot be read");
   if (ReadRow()) names_.assign(cells_.begin(), cells_.end());
+  if (last_rows != kAllRows && !names_.empty()) SkipToLast(last_rows);
+}
+
+/// Moves to the first of the last `rows` complete rows. Reads only the end of the file.
+void CsvRows::SkipToLast(std::size_t rows) {
+  constexpr std::streamoff kBlock = 1 << 16;
+  const std::streamoff first = stream_.tellg();
+  stream_.seekg(0, std::ios::end);
+  std::string block;
+  std::size_t ends = 0;  // number of line ends from the current place on
+  for (std::streamoff start = stream_.tellg(); start > first;) {
+    const std::streamoff size = std::min(kBlock, start - first);
+    block.resize(static_cast<std::size_t>(size));
+    stream_.seekg(start -= size);
+    stream_.read(block.data(), size);
+    for (std::size_t i = block.size(); i-- > 0;) {
+      // The line end before the first row counts too.
+      if (block[i] != '\n' || ++ends <= rows) continue;
+      stream_.seekg(start + static_cast<std::streamoff>(i) + 1);
+      return;
+    }
+  }
+  stream_.seekg(first);
 }
 
 std::optional<std::size_t> CsvRows::Find(std::string_view name) const {

@@ -14,12 +14,15 @@
 
 namespace alidade::internal {
 
+inline constexpr std::size_t kAllRows = static_cast<std::size_t>(-1);
+
 /// Rows of a CSV file of a run folder, read one by one. A last row without a line end is omitted:
-/// the run was interrupted while it was written.
+/// the run was interrupted while it was written, or is writing it now.
 class CsvRows {
  public:
-  /// Reads the header of `file`. The table is empty if the file does not exist. Error: kIo.
-  explicit CsvRows(const std::filesystem::path& file);
+  /// Reads the header of `file`. The table is empty if the file does not exist. `last_rows`: only
+  /// the last rows are read, whose cells must not contain line ends. Error: kIo.
+  explicit CsvRows(const std::filesystem::path& file, std::size_t last_rows = kAllRows);
 
   const std::vector<std::string>& names() const { return names_; }
   std::optional<std::size_t> Find(std::string_view name) const;
@@ -31,6 +34,7 @@ class CsvRows {
   std::size_t row() const { return count_ - 1; }
 
  private:
+  void SkipToLast(std::size_t rows);
   bool ReadRow();
   void ParseRow();
 

@@ -234,6 +234,7 @@ Json EstimatorData(const EstimatorTables& tables, const Json& columns, const Jso
                           "verdict", "diagnosis", "unobservable", "overrides"}) {
     if (tables.entry.contains(key)) data[key] = tables.entry.at(key);
   }
+  if (!tables.counts.empty()) data["counts"] = tables.counts;
   data["gate"] = gate;
   data["t"] = times.ColumnOf(tables.estimates.Times());
   Json& blocks = data["blocks"] = Json::array();

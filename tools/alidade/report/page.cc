@@ -141,7 +141,7 @@ Json DataOf(const Folder& folder, internal::ColumnPool& pool) try {
   Json data = FactsOf(folder);
   const Node config = folder.config_tree.root();
   if (!folder.run.is_null()) {
-    data["run"] = internal::RunData(folder.path, folder.run, config, pool);
+    data["run"] = internal::RunData(folder.path, folder.run, config, {}, pool);
   }
   if (!folder.comparison.is_null()) {
     data["compare"] = internal::ComparisonData(folder.path, folder.comparison, pool);

@@ -74,7 +74,7 @@ std::string Filled(std::string_view page,
 
 }  // namespace
 
-std::string PageText(const Json& data, const ColumnPool& pool) {
+std::string DataText(const Json& data, const ColumnPool& pool) {
   Json whole = {{"format", "alidade-report"},
                 {"version", 1},
                 {"status", "ok"},
@@ -94,16 +94,29 @@ std::string PageText(const Json& data, const ColumnPool& pool) {
                 {"compare", {}},
                 {"sweep", {}},
                 {"evaluation", {}},
-                {"bundle", {}}};
+                {"bundle", {}},
+                {"explain", {}}};
   whole.update(data);
   std::string text = whole.dump(-1, ' ', false, Json::error_handler_t::replace);
   text.back() = ',';  // the columns follow
-  text += "\"columns\":" + pool.Text() + '}';
+  return text + "\"columns\":" + pool.Text() + '}';
+}
+
+std::string PageText(const Json& data, const ColumnPool& pool) {
   return Filled(kPageTemplate, {{"title", HtmlEscaped(data.at("title").get<std::string>())},
                                 {"summary", SummaryItems(data)},
                                 {"style", kPageStyle},
                                 {"script", kPageScript},
-                                {"data", ScriptEscaped(text)}});
+                                {"data", ScriptEscaped(DataText(data, pool))}});
+}
+
+std::string LiveDataOf(const std::string& page, const Json& live) {
+  constexpr std::string_view kBegin = R"(<script type="application/json" id="data">{)";
+  const std::size_t begin = page.find(kBegin);
+  ALIDADE_EXPECTS(begin != page.npos);
+  const std::size_t content = begin + kBegin.size();
+  return "{\"live\":" + live.dump() + ',' +
+         page.substr(content, page.find("</script>", content) - content);
 }
 
 void WritePage(const OutputFolder& folder) {

@@ -9,8 +9,16 @@
 
 namespace alidade::internal {
 
+/// Returns the data of a page as the text of a JSON object, with the facts and results `data`
+/// (docs/report.md) and the columns of `pool`.
+std::string DataText(const Json& data, const ColumnPool& pool);
+
 /// Returns the page with the facts and results `data` (docs/report.md) and the columns of `pool`.
 std::string PageText(const Json& data, const ColumnPool& pool);
+
+/// Returns the data of a page that PageText() has returned, as the text of a JSON object. Its first
+/// key is `live` with the value `live`.
+std::string LiveDataOf(const std::string& page, const Json& live);
 
 /// Writes `report.html` into an output folder, after all other files.
 void WritePage(const OutputFolder& folder);

@@ -5,8 +5,8 @@
 #include <charconv>
 #include <limits>
 #include <map>
+#include <utility>
 
-#include "alidade/report/csv_rows.h"
 
 namespace alidade::internal {
 namespace {
@@ -75,7 +75,7 @@ RowSelection SelectRows(const std::filesystem::path& file, const std::vector<std
   CsvRows counted(file);
   const GroupKey key(counted, group);
   while (counted.Next()) is_long = ++groups[key.Of(counted)].count > max_rows || is_long;
-  if (!is_long) return std::nullopt;
+  if (!is_long) return {};
   for (auto& [name, entry] : groups) entry.length = (entry.count + max_rows - 1) / max_rows;
 
   CsvRows table(file);
@@ -86,7 +86,7 @@ RowSelection SelectRows(const std::filesystem::path& file, const std::vector<std
     rows.insert(rows.end(), entry.selected.begin(), entry.selected.end());
   }
   std::ranges::sort(rows);
-  return rows;
+  return {.rows = std::move(rows)};
 }
 
 RowSelection SelectTimes(const std::filesystem::path& file, const std::vector<Timestamp>& times) {
@@ -98,8 +98,8 @@ RowSelection SelectTimes(const std::filesystem::path& file, const std::vector<Ti
     const bool is_selected = std::ranges::binary_search(times, TimeOf(table.cells()[*time]));
     if (is_selected) rows.push_back(static_cast<std::uint32_t>(table.row()));
   }
-  if (count <= kMaxRows) return std::nullopt;
-  return rows;
+  if (count <= kMaxRows) return {};
+  return {.rows = std::move(rows)};
 }
 
 }  // namespace alidade::internal

@@ -9,11 +9,16 @@
 #include <vector>
 
 #include "alidade/base/timestamp.h"
+#include "alidade/report/csv_rows.h"
 
 namespace alidade::internal {
 
-/// Indices of the selected rows of a table, sorted. nullopt: all rows.
-using RowSelection = std::optional<std::vector<std::uint32_t>>;
+/// Selected rows of a table.
+struct RowSelection {
+  std::optional<std::vector<std::uint32_t>> rows = {};  ///< sorted indices; nullopt: all rows
+  std::size_t last = kAllRows;  ///< only this number of rows at the end of the file is read
+};
+inline RowSelection LastRows(std::size_t count) { return {.last = count}; }
 
 /// Largest number of rows of a group that a page contains. The page of a longer run has a bounded
 /// size.

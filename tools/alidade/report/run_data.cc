@@ -128,13 +128,14 @@ Json SegmentData(const Node& config, const std::deque<EstimatorTables>& estimato
 
 }  // namespace
 
-Json RunData(const fs::path& folder, const Json& run, const Node& config, ColumnPool& pool) {
+Json RunData(const fs::path& folder, const Json& run, const Node& config, const RunRows& rows,
+             ColumnPool& pool) {
   if (!run.contains("estimators")) return {};
   std::deque<EstimatorTables> estimators;
   std::vector<Timestamp> timestamps;
   for (const auto& [name, entry] : run.at("estimators").items()) {
     if (!entry.contains("blocks")) continue;  // the run ended before the files were created
-    const EstimatorTables& tables = estimators.emplace_back(folder, name, entry);
+    const EstimatorTables& tables = estimators.emplace_back(folder, name, entry, rows);
     for (const CsvColumns* table : {&tables.estimates, &tables.innovations}) {
       const std::vector<Timestamp> more = table->Times();
       timestamps.insert(timestamps.end(), more.begin(), more.end());
@@ -142,16 +143,19 @@ Json RunData(const fs::path& folder, const Json& run, const Node& config, Column
   }
   if (estimators.empty()) return {};
   std::ranges::sort(timestamps);
-  const CsvColumns truth(folder / "truth.csv", SelectTimes(folder / "truth.csv", timestamps));
+  const fs::path truth_file = folder / "truth.csv", implied_file = folder / "implied_states.csv";
+  const CsvColumns truth(truth_file, rows.are_growing() ? LastRows(rows.last)
+                                                        : SelectTimes(truth_file, timestamps));
   const std::vector<Timestamp> truth_times = truth.Times();
   timestamps.insert(timestamps.end(), truth_times.begin(), truth_times.end());
   if (timestamps.empty()) return {};
-  const RunTimes times(std::move(timestamps), pool);
+  const RunTimes times(std::move(timestamps), rows.origin, pool);
   const Json columns = ReadJsonFile(folder / "columns.json");
-  const fs::path implied_file = folder / "implied_states.csv";
-  const CsvColumns implied(implied_file, SelectRows(implied_file, {"sensor"}, ""));
-  // The page of an incomplete run shows the measurements of the last frames.
-  const bool is_complete = run.value("status", "ok") == "ok";
+  const CsvColumns implied(implied_file, rows.are_growing()
+                                             ? LastRows(rows.last)
+                                             : SelectRows(implied_file, {"sensor"}, ""));
+  // The page of a run that failed or was stopped shows the measurements of the last frames.
+  const bool is_complete = rows.are_growing() || run.value("status", "ok") == "ok";
   Json data = {{"t", times.column()},
                {"t0", Seconds(times.origin())},
                {"outcomes", OutcomeList()},

@@ -14,33 +14,70 @@ namespace {
 constexpr std::size_t kMaxGainRows = 5000;
 
 /// Selects the rows of estimates.csv and errors.csv, which have the same times.
-RowSelection EstimateRows(const std::filesystem::path& folder) {
+RowSelection EstimateRows(const std::filesystem::path& folder, const RunRows& rows) {
+  if (rows.are_growing()) return LastRows(rows.last);
   const bool has_errors = std::filesystem::exists(folder / "errors.csv");
   return SelectRows(folder / (has_errors ? "errors.csv" : "estimates.csv"), {}, "nees:");
+}
+
+RowSelection InnovationRows(const std::filesystem::path& file, const RunRows& rows) {
+  if (rows.are_growing()) return LastRows(rows.last);
+  return SelectRows(file, {"sensor", "outcome"}, "nis");
+}
+
+/// Removes rows so that both tables have the same number of rows and end at the same timestamp.
+void Align(CsvColumns& a, CsvColumns& b) {
+  const std::vector<Timestamp> a_times = a.Times(), b_times = b.Times();
+  if (a_times.empty() || b_times.empty()) return;
+  const Timestamp last = std::min(a_times.back(), b_times.back());
+  const auto count_until = [&](const std::vector<Timestamp>& times) {
+    return static_cast<std::size_t>(std::ranges::upper_bound(times, last) - times.begin());
+  };
+  const std::size_t a_count = count_until(a_times), b_count = count_until(b_times);
+  const std::size_t count = std::min(a_count, b_count);
+  a.Keep(a_count - count, count);
+  b.Keep(b_count - count, count);
+}
+
+/// Returns the number of innovations of each outcome and sensor, with the keys of run.json.
+std::map<std::string, std::int64_t> CountOutcomes(const CsvColumns& innovations) {
+  std::map<std::string, std::int64_t> counts;
+  const std::vector<std::string_view> sensors = innovations.Texts("sensor");
+  const std::vector<std::string_view> outcomes = innovations.Texts("outcome");
+  for (std::size_t i = 0; i < sensors.size(); ++i) {
+    ++counts[std::string(outcomes[i]) + ':' + std::string(sensors[i])];
+  }
+  return counts;
 }
 
 }  // namespace
 
 EstimatorTables::EstimatorTables(const std::filesystem::path& folder, const std::string& estimator,
-                                 const Json& run_entry)
+                                 const Json& run_entry, const RunRows& rows)
     : name(estimator),
       entry(run_entry),
       covariance_file(folder / name / "trajectory_covariance.tum"),
-      errors(folder / name / "errors.csv", EstimateRows(folder / name)),
-      estimates(folder / name / "estimates.csv", EstimateRows(folder / name)),
+      errors(folder / name / "errors.csv", EstimateRows(folder / name, rows)),
+      estimates(folder / name / "estimates.csv", EstimateRows(folder / name, rows)),
       innovations_file(folder / name / "innovations.csv"),
-      innovations(innovations_file, SelectRows(innovations_file, {"sensor", "outcome"}, "nis")),
-      gains(folder / name / "gains.csv",
+      innovations(innovations_file, InnovationRows(innovations_file, rows)),
+      gains(rows.are_growing() ? std::filesystem::path() : folder / name / "gains.csv",
             SelectRows(folder / name / "gains.csv", {"sensor"}, "", kMaxGainRows)),
       landmarks(folder / name / "landmarks.csv"),
       events(folder / name / "events.csv"),
-      final_covariance(folder / name / "final_covariance.csv") {}
+      final_covariance(folder / name / "final_covariance.csv") {
+  if (!rows.are_growing()) return;
+  covariance_file.clear();
+  Align(estimates, errors);
+  counts = CountOutcomes(innovations);
+}
 
-RunTimes::RunTimes(std::vector<Timestamp> times, ColumnPool& pool)
+RunTimes::RunTimes(std::vector<Timestamp> times, Timestamp origin, ColumnPool& pool)
     : all_(std::move(times)), pool_(pool) {
   std::ranges::sort(all_);
   all_.erase(std::unique(all_.begin(), all_.end()), all_.end());
-  column_ = pool.AddTimes(all_, origin());
+  origin_ = origin == kNoTimestamp ? all_.front() : origin;
+  column_ = pool.AddTimes(all_, origin_);
 }
 
 std::uint32_t RunTimes::IndexOf(Timestamp time) const {

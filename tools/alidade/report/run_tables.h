@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,11 +13,22 @@
 
 namespace alidade::internal {
 
+/// Rows of the files of a run that a page shows. By default, these are all rows of a finished run.
+struct RunRows {
+  std::size_t last = kAllRows;  ///< number of rows at the end of each file
+  Timestamp origin = kNoTimestamp;  ///< zero of the times; kNoTimestamp: the first timestamp
+
+  /// Returns whether the run is still writing its files.
+  bool are_growing() const { return last != kAllRows; }
+};
+
 /// Files of one estimator in a run folder. Of long files, only selected rows are read: each
 /// rejected measurement is a row of a group of its own, so that accepted ones do not displace it.
 struct EstimatorTables {
+  /// The last rows of `estimates` and `errors` have the same timestamps, also while the run writes
+  /// these files. Gains and covariances of the poses of a run that is not finished are omitted.
   EstimatorTables(const std::filesystem::path& folder, const std::string& estimator,
-                  const Json& run_entry);
+                  const Json& run_entry, const RunRows& rows);
 
   std::string name;
   const Json& entry;  ///< entry of the estimator in run.json
@@ -24,17 +36,21 @@ struct EstimatorTables {
   CsvColumns errors, estimates;
   std::filesystem::path innovations_file;
   CsvColumns innovations, gains, landmarks, events, final_covariance;
+  /// Number of innovations of each outcome and sensor, if the run is not finished: otherwise
+  /// `entry` contains these numbers.
+  std::map<std::string, std::int64_t> counts;
 };
 
 /// Timestamps of a run: the union of the timestamps of all its files, sorted. Stores the times of
 /// each file as places in this union.
 class RunTimes {
  public:
-  /// Adds the union to `pool`. `times` must not be empty.
-  RunTimes(std::vector<Timestamp> times, ColumnPool& pool);
+  /// Adds the union to `pool`. `times` must not be empty. `origin` is the zero of the times;
+  /// kNoTimestamp means the first timestamp.
+  RunTimes(std::vector<Timestamp> times, Timestamp origin, ColumnPool& pool);
 
   const std::vector<Timestamp>& all() const { return all_; }
-  Timestamp origin() const { return all_.front(); }
+  Timestamp origin() const { return origin_; }
   /// Returns the column of all timestamps.
   int column() const { return column_; }
   /// Returns the column of `times`, which are part of the union.
@@ -51,6 +67,7 @@ class RunTimes {
   std::uint32_t IndexOf(Timestamp time) const;
 
   std::vector<Timestamp> all_;
+  Timestamp origin_;
   ColumnPool& pool_;
   int column_;
 };

@@ -97,7 +97,7 @@ Json TrajectoryData(const std::vector<PageTrajectory>& trajectories,
   };
   if (reference != nullptr) add(*reference);
   for (const PageTrajectory& trajectory : trajectories) add(trajectory);
-  const RunTimes times(std::move(timestamps), pool);
+  const RunTimes times(std::move(timestamps), kNoTimestamp, pool);
   Json truth = Json::object(), estimators = Json::array();
   for (std::size_t i = 0; reference != nullptr && i < kAxes.size(); ++i) {
     const std::vector<double> values = ElementOf(reference->positions, i);

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Data of the page: the JSON object that the program wrote, and its columns.
 
-const DATA = JSON.parse(document.getElementById('data').textContent);
+const caches = [];
 
-if (DATA.format !== 'alidade-report' || DATA.version !== 1)
-  throw new Error('this page cannot read its data');
+/** A map of results that is emptied when the data change. */
+function newCache() {
+  caches.push(new Map());
+  return caches[caches.length - 1];
+}
 
-const decoded = new Map();
+const decoded = newCache();
 
 function bytes(base64) {
   const s = atob(base64);
@@ -83,17 +86,42 @@ function columnOf(ref) {
   return decoded.get(ref);
 }
 
-const RUN = DATA.run;
-const COMPARISON = DATA.compare;
-const SWEEP = DATA.sweep;
+let DATA;
+let RUN;
+let COMPARISON;
+let SWEEP;
+/** Names of the estimators. */
+let NAMES;
+/** The estimators with a verdict. Trajectories from files have none. */
+let JUDGED;
+/** Offset of the displayed times: those of the files, unless these count from 1970. */
+let T0;
 /** True: the run has times. The cameras of a bundle adjustment may have numbers only. */
-const HAS_TIMES = RUN !== null && (!DATA.bundle || DATA.bundle.has_times);
+let HAS_TIMES;
 
-const NAMES = RUN
-  ? RUN.estimators.map((e) => e.name)
-  : COMPARISON
-    ? COMPARISON.estimators.map((e) => e.name)
-    : unique(SWEEP ? SWEEP.groups.map((g) => g.estimator) : []);
+function namesOfEstimators({run, compare, sweep, explain}) {
+  if (sweep) return unique(sweep.groups.map((g) => g.estimator));
+  const problems = explain ? explain.problems : [];
+  const {estimators} = run || compare || {estimators: problems.flatMap((p) => p.estimators)};
+  return estimators.map((e) => e.name);
+}
+
+/** Sets the data of the page. `run` contains the content of data.run. */
+function setData(data, run = data.run) {
+  if (data.format !== 'alidade-report' || data.version !== 1)
+    throw new Error('this page cannot read its data');
+  for (const cache of caches) cache.clear();
+  DATA = data;
+  RUN = run;
+  COMPARISON = data.compare;
+  SWEEP = data.sweep;
+  HAS_TIMES = Boolean(RUN) && (!data.bundle || data.bundle.has_times);
+  NAMES = namesOfEstimators(data);
+  JUDGED = RUN ? RUN.estimators.filter((e) => e.verdict) : [];
+  T0 = RUN && Math.abs(RUN.t0) < 1e6 ? RUN.t0 : 0;
+}
+
+setData(JSON.parse(document.getElementById('data').textContent));
 
 const isZero = (ref) => DATA.columns[ref].d === 'const' && DATA.columns[ref].v === 0;
 

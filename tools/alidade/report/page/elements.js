@@ -5,7 +5,7 @@ const SVGNS = 'http://www.w3.org/2000/svg';
 const SVG_FONT = 'font-family="system-ui, Liberation Sans, Arial, sans-serif"';
 
 function element(tag, props, ...kids) {
-  const svg = /^(svg|path|rect|line)$/.test(tag);
+  const svg = /^(svg|path|rect|line|text)$/.test(tag);
   const el = svg ? document.createElementNS(SVGNS, tag) : document.createElement(tag);
   for (const [k, v] of Object.entries(props || {})) {
     if (v === undefined || v === null || v === false) continue;

@@ -4,10 +4,12 @@
 function headerOf() {
   const tools = element('div', {class: 'tools'}, themeButton(), printButton());
   const title = element('div', {class: 'headline'}, element('h1', {}, DATA.title), tools);
+  const factList = element('ul', {class: 'facts'}, facts());
+  if (DATA.live) page.listeners.push(() => setContent(factList, facts()));
   const command =
     DATA.command &&
     element('span', {class: 'cmd'}, DATA.command, copyButton(() => DATA.command));
-  return element('header', {}, title, element('ul', {class: 'facts'}, facts()), command);
+  return element('header', {}, title, factList, liveStatus(), command);
 }
 
 const printButton = () => element('button', {class: 'btn', onclick: () => print()}, 'print');

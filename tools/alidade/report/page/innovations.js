@@ -4,9 +4,9 @@
 /** The innovations of a sensor of an estimator, or undefined. */
 const innovationsOf = (e, sensor) => e.innovations.find((I) => I.sensor === sensor);
 
-/** f(key object, ...), computed once for each key object. */
+/** f(key object, ...), computed once for each key object of the same data. */
 function once(f) {
-  const results = new WeakMap();
+  const results = newCache();
   return (key, ...more) => {
     if (!results.has(key)) results.set(key, f(key, ...more));
     return results.get(key);

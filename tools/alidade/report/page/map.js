@@ -4,11 +4,7 @@
 /** One view of the map. `first`: another view whose options this view shares. */
 class MapView {
   constructor(mode, first) {
-    this.tracks = mapTracks();
-    this.truth = mapTruth(this.tracks[0]);
-    this.maps = this.tracks
-      .filter(({e}) => e.landmarks)
-      .map(({e}) => ({name: e.name, ...mapColumns(e)}));
+    this.load();
     const path = samplePath(this.truth || this.tracks[0]);
     const places = this.maps.slice(0, 1).flatMap(landmarkPlaces);
     const plane = fitPlane(path, places);
@@ -18,9 +14,18 @@ class MapView {
     this.options = first ? first.options : {paintBy: this.defaultColour(), ellipses: true};
     const name = mode === 'top' ? 'top view of trajectory and landmarks' : 'oblique view';
     this.spec = {label: '', name, height: 470, y: {}};
-    this.dirty = true;
     this.addElements();
     followMap(this);
+  }
+
+  /** Reads the data. */
+  load() {
+    this.tracks = mapTracks();
+    this.truth = mapTruth(this.tracks[0]);
+    this.maps = this.tracks
+      .filter(({e}) => e.landmarks)
+      .map(({e}) => ({name: e.name, ...mapColumns(e)}));
+    this.dirty = true;
   }
 
   defaultColour() {

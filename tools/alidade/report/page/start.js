@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // Start: builds the page.
 
-/** Sets the time range of the page. Returns false if the page has no time. */
+/**
+ * Sets the time range of the page. A visible time that is a part of the range stays. Returns false
+ * if the page has no time.
+ */
 function setTimeRange() {
   const over_time = COMPARISON && COMPARISON.over_time;
   const ref = HAS_TIMES ? RUN.t : over_time ? over_time.t : null;
   if (ref === null) return false;
   const times = columnOf(ref);
   const last = times[times.length - 1];
+  const showsAll = page.x[0] <= page.full[0] && page.x[1] >= page.full[1];
   page.full = [times[0], last > times[0] ? last : times[0] + 1];
-  page.x = page.full.slice();
+  if (showsAll || page.x[1] <= page.full[0]) page.x = page.full.slice();
   return true;
 }
 
@@ -98,29 +102,47 @@ function listen() {
   addEventListener('afterprint', toScreen);
 }
 
-function start() {
+/** Builds the page from the data. */
+function build() {
+  dispose([...plots]);
+  nav.length = page.listeners.length = 0;
   const main = element('main');
   const hasTime = setTimeRange();
-  followTheme();
-  readHash();
   const head = headerOf();
-  document.getElementById('app').append(head, legendBar(hasTime), main, footer(), tip);
-  if (DATA.status !== 'ok' && !DATA.bundle) failureSection(main);
+  const bar = DATA.explain ? '' : legendBar(hasTime);
+  document.getElementById('app').replaceChildren(head, bar, main, footer(), tip);
+  if (DATA.status !== 'ok' && !DATA.bundle && !isRunning()) failureSection(main);
   const summary = summarySection(main);
   if (DATA.evaluation) evaluationSection(main);
   if (DATA.bundle) bundleSection(main);
   if (COMPARISON) compareSection(main);
+  if (DATA.explain) explainSection(main);
   if (SWEEP && SWEEP.vary) varySection(main);
   if (SWEEP) sweepSection(main);
   if (RUN) runSections(main, summary);
   tailSections(main);
   const links = nav.map(([id, title]) => element('a', {href: '#' + id}, title));
   head.append(element('nav', {class: 'jump', 'aria-label': 'sections'}, links));
-  listen();
-  redraw();
+  setTheme(page.dark);
 }
 
 /** For tests of the page. */
-window.alidadeReport = {page, plots, run: RUN, bundle: DATA.bundle, columnOf, setTheme};
+window.alidadeReport = {
+  page,
+  plots,
+  columnOf,
+  setTheme,
+  get run() {
+    return RUN;
+  },
+  get bundle() {
+    return DATA.bundle;
+  },
+};
 
-start();
+followTheme();
+setTimeRange();
+readHash();
+build();
+listen();
+followRun();

@@ -15,9 +15,6 @@ const page = {
 const shown = (name) => name === undefined || !page.hidden.has(name);
 const dim = (name) => (page.focus && name !== undefined && name !== page.focus ? 0.16 : 1);
 
-/** Offset of the displayed times: those of the files, unless these count from 1970. */
-const T0 = RUN && Math.abs(RUN.t0) < 1e6 ? RUN.t0 : 0;
-
 const plots = new Set();
 let pending = false;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Section "Estimates and errors".
 
-const elementMemo = new Map();
+const elementMemo = newCache();
 
 /**
  * Elements of a block of an estimator: {values, errors}, lists of {label, unit, y, sigma, truth}.
@@ -42,7 +42,13 @@ const usersOf = (name) =>
   RUN.estimators
     .map((e) => ({e, block: e.blocks.find((b) => b.name === name)}))
     .filter(({block}) => block)
-    .map((user) => ({...user, elements: elementsOf(user.e, user.block)}));
+    .map(({e, block}) => ({
+      e,
+      block,
+      get elements() {
+        return elementsOf(e, block);
+      },
+    }));
 
 /** Layers of element k: estimates with their bands, implied states and truth. */
 function valueLayers(users, k) {

@@ -49,7 +49,7 @@ function configFold(parent) {
 }
 
 function fileFold(parent) {
-  if (!DATA.files.length) return;
+  if (!DATA.files.length || DATA.live) return; // the server of a live page has no such files
   fold(parent, 'Files of this folder', plural(DATA.files.length, 'file'), (box) => {
     const links = DATA.files.map((file) => [element('a', {href: encodeURI(file)}, file), '  ']);
     box.append(element('p', {class: 'panel'}, links));

@@ -13,9 +13,6 @@ const VERDICTS = {
   'not tested': ['calm', '?'],
 };
 
-/** The estimators with a verdict. Trajectories from files have none. */
-const JUDGED = RUN ? RUN.estimators.filter((e) => e.verdict) : [];
-
 /** {state, because, since, cls, mark} of an estimator; since: seconds after the start, or null. */
 function verdictOf(e) {
   const {state, because, since_s: since} = e.verdict;

@@ -34,7 +34,9 @@ class LongRun : public testing::ProgramTest {
       const std::string text = testing::ReadText(status);
       const std::size_t at = text.find("VmHWM:");
       if (at != std::string::npos) whole = std::stol(text.substr(at + 6));
-      if (!Exists("out.partial/ekf/final_covariance.csv")) peak = whole;
+      const bool is_running =
+          Exists("out.partial") && !Exists("out.partial/ekf/final_covariance.csv");
+      if (is_running) peak = whole;
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
     const testing::Outcome outcome = Wait(pid);

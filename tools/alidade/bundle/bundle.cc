@@ -52,8 +52,8 @@ class Components {
 
 using Residual = std::array<double, 4>;
 
-/// Computes z (-) h. The elements beyond the size of z are NaN. Returns nullopt if h is undefined or
-/// |z (-) h|^2 is not finite.
+/// Computes z (-) h. The elements beyond the size of z are NaN. Returns nullopt if h is undefined
+/// or |z (-) h|^2 is not finite.
 std::optional<Residual> ResidualOf(const SensorModel& sensor, const BundleRoles& roles,
                                    const BundleProblem& problem,
                                    const BundleObservation& observation) {

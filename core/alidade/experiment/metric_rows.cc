@@ -235,7 +235,7 @@ bool IsAlarm(const EstimatorResult& estimator, const MetricKey& key) {
   const std::string kind = key.name.substr(0, key.name.find('.'));
   const auto value = [&](const std::string& name) {
     const auto found = estimator.metrics.find(MetricKey{name, key.subject, key.segment}.text());
-    return found == estimator.metrics.end() ? 1.0 : found->second;
+    return found == estimator.metrics.end() ? std::nan("") : found->second;
   };
   return value(key.name) < value(kind + ".low") || value(key.name) > value(kind + ".high");
 }

@@ -119,8 +119,8 @@ TEST(ComparisonTable, FoldsWhatIsWiderThanALine) {
   EXPECT_GT(widest, 60);
 }
 
-// Four errors come first, then two rows of each other metric, in the order of the config. The third
-// NIS is left out, because there are nine rows.
+// Three errors come first, then two rows of each other metric, in the order of the config. The third
+// NIS and the shares inside the 95 % region are left out, because there are nine rows.
 TEST(MainKeys, AreTheMostRelevantOnes) {
   EstimatorResult ekf = Named("ekf", {});
   for (const char* block : {"cam.heading", "cam.position", "cam.velocity", "cam.pixel"}) {
@@ -138,10 +138,11 @@ TEST(MainKeys, AreTheMostRelevantOnes) {
   result.estimators = {ekf};
   const std::vector<std::string> subjects = {"cam.position", "cam",   "cam.heading", "cam.velocity",
                                              "cam.pixel",    "right", "left",        "top"};
-  EXPECT_EQ(internal::MainKeys(result, subjects),
-            (std::vector<std::string>{"rmse:cam.position", "rmse:cam.heading", "rmse:cam.velocity",
-                                      "rmse:cam.pixel", "nees.mean:cam", "nis.mean:right",
-                                      "nis.mean:left", "accepted:right", "accepted:left"}));
+  EXPECT_EQ(
+      internal::MainKeys(result, subjects),
+      (std::vector<std::string>{"rmse:cam.position", "rmse:cam.heading", "rmse:cam.velocity",
+                                "nees.mean:cam", "nis.mean:right", "nis.mean:left",
+                                "accepted:right", "accepted:left", "coverage95:cam.position"}));
 }
 
 // A clock offset is a constant: its error at the end matters, not its RMSE.

@@ -119,8 +119,8 @@ TEST(ComparisonTable, FoldsWhatIsWiderThanALine) {
   EXPECT_GT(widest, 60);
 }
 
-// Three errors come first, then two rows of each other metric, in the order of the config. The third
-// NIS and the shares inside the 95 % region are left out, because there are nine rows.
+// Three errors come first, then two rows of each other metric, in the order of the config. The
+// third NIS and most shares inside the 95 % region are left out, because there are nine rows.
 TEST(MainKeys, AreTheMostRelevantOnes) {
   EstimatorResult ekf = Named("ekf", {});
   for (const char* block : {"cam.heading", "cam.position", "cam.velocity", "cam.pixel"}) {

@@ -235,7 +235,7 @@ bool IsAlarm(const EstimatorResult& estimator, const MetricKey& key) {
   const std::string kind = key.name.substr(0, key.name.find('.'));
   const auto value = [&](const std::string& name) {
     const auto found = estimator.metrics.find(MetricKey{name, key.subject, key.segment}.text());
-    return found == estimator.metrics.end() ? 1.0 : found->second;
+    return found == estimator.metrics.end() ? std::nan("") : found->second;
   };
   return value(key.name) < value(kind + ".low") || value(key.name) > value(kind + ".high");
 }
@@ -279,17 +279,18 @@ bool IsOfSensor(const RunResult& result, const MetricKey& key) {
   return key.subject.size() > owner.size() && std::ranges::any_of(result.estimators, has_sensor);
 }
 
-constexpr int kErrorPriority = 1;  ///< priority of rmse in kMetrics
+/// Ranks of the errors of blocks, of the errors of states of sensors, and of the measurements. The
+/// rank of another metric is twice its priority.
+constexpr int kErrorRank = 2, kSensorStateRank = 3, kAcceptedRank = 8;
 
-/// Returns the relevance of a metric or count, from 1; 0 if it is not relevant. The error of a
-/// block of a sensor is its error at the end.
-int PriorityOf(const RunResult& result, const MetricKey& key) {
-  constexpr int kAcceptedPriority = 4;
+/// Returns the rank of a metric or count by its relevance, from 1; 0 if it is not relevant. The
+/// error of a state of a sensor is its error at the end.
+int RankOf(const RunResult& result, const MetricKey& key) {
   if (!key.segment.empty()) return 0;
-  if (IsAccepted(key)) return kAcceptedPriority;
-  if (IsOfSensor(result, key)) return key.name == "final_error" ? kErrorPriority : 0;
+  if (IsAccepted(key)) return kAcceptedRank;
+  if (IsOfSensor(result, key)) return key.name == "final_error" ? kSensorStateRank : 0;
   const MetricInfo* const metric = FindMetric(key.name);
-  return metric == nullptr || !IsShown(result, key) ? 0 : metric->priority;
+  return metric == nullptr || !IsShown(result, key) ? 0 : 2 * metric->priority;
 }
 
 std::string ReferenceLine(const RunResult& result) {
@@ -372,7 +373,7 @@ std::vector<std::string> SubjectsOf(const Experiment& experiment) {
 
 std::vector<std::string> MainKeys(const RunResult& result,
                                   const std::vector<std::string>& subjects) {
-  constexpr std::size_t kMainRows = 9, kErrors = 4, kOthers = 2;
+  constexpr std::size_t kMainRows = 9, kErrors = 3, kOthers = 2;
   std::vector<std::string> keys = Keys(result, &EstimatorResult::metrics);
   const std::vector<std::string> counted = Keys(result, &EstimatorResult::counts);
   keys.insert(keys.end(), counted.begin(), counted.end());
@@ -380,14 +381,14 @@ std::vector<std::string> MainKeys(const RunResult& result,
   for (const std::string& text : keys) {
     const MetricKey key = MetricKey::Parse(text);
     const auto position = std::ranges::find(subjects, key.subject) - subjects.begin();
-    const int priority = PriorityOf(result, key);
-    if (priority > 0) by_relevance[{priority, position}].push_back(text);
+    const int rank = RankOf(result, key);
+    if (rank > 0) by_relevance[{rank, position}].push_back(text);
   }
-  std::map<int, std::size_t> counts;  // number of keys of each priority
+  std::map<int, std::size_t> counts;  // number of keys of each rank
   std::vector<std::string> first, later;
   for (const auto& [relevance, same] : by_relevance) {
     for (const std::string& text : same) {
-      const std::size_t limit = relevance.first == kErrorPriority ? kErrors : kOthers;
+      const std::size_t limit = relevance.first == kErrorRank ? kErrors : kOthers;
       (counts[relevance.first]++ < limit ? first : later).push_back(text);
     }
   }

@@ -26,9 +26,9 @@ std::vector<TableRow> ComparisonRows(const RunResult& result);
 /// sensors of each estimator.
 std::vector<std::string> SubjectsOf(const Experiment& experiment);
 /// Returns the keys of the metrics and counts that are most relevant to a run, at most nine:
-/// errors, NEES, NIS, measurements, and the others by MetricInfo::priority. The first four errors,
-/// and the first two subjects of each other metric, come before all later subjects. `subjects`
-/// contains the subjects in order.
+/// errors, NEES, NIS, measurements, and the others by MetricInfo::priority. The first three
+/// errors, and the first two subjects of each other metric, come before all later subjects.
+/// `subjects` contains the subjects in order.
 std::vector<std::string> MainKeys(const RunResult& result,
                                   const std::vector<std::string>& subjects);
 /// Returns the table of the verdicts and of these keys, in this order. The estimators are columns

@@ -30,11 +30,11 @@ TEST(FormatTable, AlignsNumbersAtThePoint) {
                                              {"marked", {"206 !", "-"}},
                                              {"small", {"0.0012", "0.5"}}});
   EXPECT_EQ(FormatTable(table, TableFormat::kText),
-            "                a         b\n"
-            "x           2.04   diverged\n"
-            "count   1,234         75/75\n"
-            "marked    206 !           -\n"
-            "small       0.0012      0.5\n");
+            "                 a         b\n"
+            "x           2.04    diverged\n"
+            "count   1,234        75/75\n"
+            "marked    206 !          -\n"
+            "small       0.0012       0.5\n");
 }
 
 TEST(FormatTable, DividesTheTableAndWrapsHeaders) {

@@ -313,7 +313,10 @@ Section DecompositionSection(const Comparison& comparison, const DecompositionSt
         "at the last frame, the batch of all data equals the full-information filter");
   }
   if (step.kind == DecompositionKind::kRejected) {
-    section.lines.push_back(RejectedText(step) + (comparison.runs > 1 ? ", mean of the runs" : ""));
+    const std::string text = RejectedText(step);
+    if (!text.empty()) {
+      section.lines.push_back(text + (comparison.runs > 1 ? ", mean of the runs" : ""));
+    }
   }
   const auto rejected = step.values.find("rejected");
   if (rejected != step.values.end() && rejected->second.mean == 0.0) return section;

@@ -69,7 +69,7 @@ LiveRun::Impl::Impl(std::uint16_t port, const std::filesystem::path& run_folder,
                     const Config& run_config)
     : folder(run_folder),
       partial(internal::PartialOf(run_folder)),
-      config(run_config),
+      config(run_config.Copy()),  // reading a config records the keys, so threads need copies
       title("Run"),
       server(port, {[this] {
                       internal::ColumnPool pool;

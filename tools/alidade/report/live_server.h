@@ -14,7 +14,8 @@ namespace alidade::internal {
 ///
 /// Updates are sent at most 10 times a second. After an update the server waits at least 100
 /// times the CPU time that its thread has needed since the update before. The thread thus needs at
-/// most 1 % of the time of one core. An update that a browser cannot receive yet is dropped and counted.
+/// most 1 % of the time of one core. An update that a browser cannot receive yet is dropped and
+/// counted.
 class LiveServer {
  public:
   /// Texts that the server sends. Both are called on its thread. If a function throws an Error, the

@@ -47,6 +47,8 @@ struct Input {
   std::vector<std::string> sets;  ///< assignments `key=value`, applied in this order
   std::vector<std::string> plugin_paths;
   bool allow_outside = false;
+  /// The assignments that inputs.json records instead of `sets`: those of a run that is repeated.
+  std::vector<std::string> recorded_sets = {};
 
   void AddTo(CLI::App& command);
   Config Load() const;

@@ -121,6 +121,7 @@ void Input::AddTo(CLI::App& command) {
   AddPluginPath(command, plugin_paths);
   command.add_flag("--allow-outside", allow_outside,
                    "allow paths in `include:` and `output:` that lead out of their folders");
+  command.add_option("--recorded-set", recorded_sets, "for `alidade replay`")->group("");
 }
 
 Config Input::Load() const {
@@ -163,7 +164,10 @@ PluginHost Input::HostFor(const Config& loaded, const std::vector<Config>& other
 std::string Input::InputsText(const Config& loaded, const std::vector<std::string>& arguments,
                               const std::vector<Config>& runs,
                               const internal::PluginHashes& plugins) const {
-  internal::CommandInputs command{arguments, {}, internal::PluginFoldersOfEnvironment()};
+  internal::CommandInputs command{arguments,
+                                  recorded_sets.empty() ? sets : recorded_sets,
+                                  {},
+                                  internal::PluginFoldersOfEnvironment()};
   for (const fs::path& path : Absolute(plugin_paths)) {
     if (std::ranges::find(command.plugin_paths, path) == command.plugin_paths.end())
       command.plugin_paths.push_back(path);

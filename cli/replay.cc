@@ -77,6 +77,9 @@ ExitCode RepeatCommand(const internal::RecordedInputs& recorded, const fs::path&
   }
   std::vector<std::string> arguments = recorded.command.arguments;
   arguments.insert(arguments.end(), {config.string(), "-o", output.string(), "--quiet"});
+  for (const std::string& setting : recorded.command.settings) {
+    arguments.insert(arguments.end(), {"--recorded-set", setting});
+  }
   for (const fs::path& path : recorded.command.plugin_paths) {
     if (fs::exists(path, error))
       arguments.insert(arguments.end(), {"--plugin-path", path.string()});

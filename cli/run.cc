@@ -84,6 +84,7 @@ void FinishLive(LiveRun& live, const std::filesystem::path& folder, bool quiet) 
 /// Returns the options that affect the bytes of the run folder.
 std::vector<std::string> ArgumentsOf(const RunArguments& arguments) {
   std::vector<std::string> list = {"run"};
+  if (arguments.seed) list.insert(list.end(), {"--seed", std::to_string(*arguments.seed)});
   if (arguments.covariances) list.emplace_back("--covariances");
   return list;
 }

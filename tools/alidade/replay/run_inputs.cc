@@ -194,6 +194,7 @@ std::string InputsJson(const CommandInputs& command, const Config& config,
                              ", \"sha256\": " + JsonString(hash) + '}');
   }
   return "{\n  \"arguments\": " + BracketedList('[', JsonStrings(command.arguments), ']') +
+         ",\n  \"settings\": " + BracketedList('[', JsonStrings(command.settings), ']') +
          ",\n  \"config\": {\"file\": " + JsonString(fs::path(config.name()).filename().string()) +
          ", \"sha256\": " + JsonString(Sha256(config.ToYaml())) +
          "},\n  \"plugin_paths\": " + BracketedList('[', paths, ']') +
@@ -207,6 +208,7 @@ RecordedInputs ReadInputs(const std::string& text, const std::string& file) {
   return ReadJsonText(text, file, [](const Json& json) {
     RecordedInputs inputs;
     inputs.command.arguments = json.at("arguments").get<std::vector<std::string>>();
+    inputs.command.settings = json.at("settings").get<std::vector<std::string>>();
     for (const Json& path : json.at("plugin_paths"))
       inputs.command.plugin_paths.emplace_back(path.get<std::string>());
     for (const Json& path : json.at("plugin_folders"))

@@ -21,6 +21,7 @@ struct CommandInputs {
   /// The command and the options that affect the output, as in {"run", "--covariances"}. Excludes
   /// the config, and options whose values are part of the resolved config.
   std::vector<std::string> arguments;
+  std::vector<std::string> settings;  ///< values of --set, for the command that the page shows
   std::vector<std::filesystem::path> plugin_paths;  ///< paths from --plugin-path
   /// Folders of plugins from the environment. Unlike in `plugin_paths`, a rejected plugin in these
   /// folders is not an error. The folders are not compared.

@@ -69,7 +69,11 @@ std::string CommandOf(const Folder& folder) {
   if (!folder.inputs.contains("arguments")) return "";
   auto arguments = folder.inputs.at("arguments").get<std::vector<std::string>>();
   if (arguments.empty()) return "";
-  arguments.insert(arguments.begin() + 1, ConfigName(folder));
+  std::vector<std::string> inserted = {internal::ShellWord(ConfigName(folder))};
+  for (const Json& setting : folder.inputs.value("settings", Json::array())) {
+    inserted.push_back("--set " + internal::ShellWord(setting.get<std::string>()));
+  }
+  arguments.insert(arguments.begin() + 1, inserted.begin(), inserted.end());
   return "alidade " + internal::Join(arguments, " ");
 }
 

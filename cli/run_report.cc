@@ -129,8 +129,10 @@ void RunReport::OnFrame(const SourceFrame& frame) {
 std::string RunReport::Head(const RunResult& result) const {
   std::string text = CountedText(result.estimators.size(), "estimator") + ", " +
                      CountedText(static_cast<std::size_t>(result.frames), "frame");
-  if (last_ > first_)
-    text += ", " + internal::RoundedText(Seconds(last_ - first_), 4) + " s of data";
+  if (last_ > first_) {
+    const double s = Seconds(last_ - first_);
+    text += ", " + internal::FixedText(s, s < 10.0 ? 2 : s < 1000.0 ? 1 : 0) + " s of data";
+  }
   return text + ", seed " + std::to_string(seed_) + '\n';
 }
 

@@ -207,6 +207,12 @@ class PageCase(unittest.TestCase):
 
 class RunPages(PageCase):
 
+    def test_the_command_repeats_the_run(self):
+        self.open("set", "run", "05_depth_principled/config.yaml", "--seed", "3", "--set",
+                  "sensors.stereo.sigma_px=2")
+        self.assertIn("alidade run config.yaml --set sensors.stereo.sigma_px=2 --seed 3",
+                      self.script("return document.querySelector('.cmd').textContent"))
+
     def test_depth_run(self):
         folder = self.open_depth()
         self.expect_sound()

@@ -45,7 +45,7 @@ std::string Summary(const RunArguments& arguments, const RunReport& report, cons
                     const Recorder& recorder) {
   std::string text = arguments.verbose
                          ? report.Verbose(result, recorder.conclusions(), arguments.all)
-                         : report.Short(result, arguments.all);
+                         : report.Short(result, recorder.conclusions(), arguments.all);
   if (!arguments.video.empty()) text += "\nvideo    " + arguments.video + '\n';
   return text + ReportLine(recorder.folder());
 }

@@ -2,6 +2,7 @@
 #include "run_report.h"
 
 #include <algorithm>
+#include <functional>
 #include <iomanip>
 #include <limits>
 #include <locale>
@@ -105,12 +106,67 @@ std::string ShortVerdicts(const RunResult& result) {
   return text;
 }
 
-std::string CountedText(std::size_t count, const std::string& noun) {
-  return std::to_string(count) + ' ' + noun + (count == 1 ? "" : "s");
-}
-
 std::size_t CountLines(const std::string& text) {
   return static_cast<std::size_t>(std::ranges::count(text, '\n'));
+}
+
+/// Events of one kind and with the same first event, of several estimators.
+struct SharedEvents {
+  EventKind kind;
+  std::string line;
+  std::size_t count;
+  std::vector<std::string> names;
+};
+
+/// Returns a line for each kind of warning or error of the estimators, errors first. Omits events
+/// that the verdicts contain, and those of estimators that have ended or diverged.
+std::vector<std::string> WarningLines(const RunResult& result) {
+  std::vector<SharedEvents> shared;
+  for (const EstimatorResult& estimator : result.estimators) {
+    if (estimator.failed || estimator.diverged) continue;
+    for (const EventGroup& group : Group(estimator.events)) {
+      const Event& first = *group.events.front();
+      const bool is_known = estimator.verdict.because.starts_with(first.text);
+      if (is_known || InfoOf(group.kind).severity == EventSeverity::kInfo) continue;
+      const std::string line = EventLine(first);
+      auto same = std::ranges::find_if(shared, [&](const SharedEvents& events) {
+        return events.kind == group.kind && events.line == line;
+      });
+      if (same == shared.end()) {
+        same = shared.insert(same, {group.kind, line, group.events.size(), {}});
+      }
+      same->names.push_back(estimator.name);
+    }
+  }
+  std::ranges::stable_sort(shared, std::greater<>(),
+                           [](const SharedEvents& events) { return InfoOf(events.kind).severity; });
+  std::vector<std::string> lines;
+  for (const SharedEvents& events : shared) {
+    const std::string count =
+        events.count > 1 ? ", " + std::to_string(events.count) + " times" : "";
+    lines.push_back(std::string(ToString(events.kind)) + "  " + internal::Join(events.names) +
+                    count + ": " + events.line);
+  }
+  return lines;
+}
+
+/// Returns at most `max_lines` lines of these items, which are wrapped.
+std::string FirstLines(const std::vector<std::string>& items, std::size_t max_lines,
+                       std::size_t width) {
+  std::string text;
+  std::size_t shown = 0;
+  for (const std::string& item : items) {
+    const std::string more = text + internal::WrapText(item + '\n', width);
+    if (CountLines(more) > max_lines) break;
+    text = more;
+    ++shown;
+  }
+  const std::size_t omitted = items.size() - shown;
+  return text + (omitted == 0 ? "" : "and " + std::to_string(omitted) + " more: -v\n");
+}
+
+std::string CountedText(std::size_t count, const std::string& noun) {
+  return std::to_string(count) + ' ' + noun + (count == 1 ? "" : "s");
 }
 
 }  // namespace
@@ -142,9 +198,15 @@ std::string RunReport::Table(const RunResult& result, bool all_rows, std::size_t
                              width_, max_lines);
 }
 
-std::string RunReport::Short(const RunResult& result, bool all_rows) const {
-  constexpr std::size_t kMaxLines = 23, kMinTable = 4;
-  const std::string text = internal::WrapText(Head(result) + ShortVerdicts(result), width_) + '\n';
+std::string RunReport::Short(const RunResult& result,
+                             const std::vector<internal::Conclusion>& conclusions,
+                             bool all_rows) const {
+  constexpr std::size_t kMaxLines = 23, kMinTable = 4, kMaxWarnings = 5, kMaxConclusion = 2;
+  std::string text = internal::WrapText(Head(result) + ShortVerdicts(result), width_);
+  text += FirstLines(WarningLines(result), kMaxWarnings, width_);
+  const std::vector<std::string> lines = internal::ConclusionLines(conclusions);
+  if (!lines.empty()) text += FirstLines({lines.front()}, kMaxConclusion, width_);
+  text += '\n';
   const std::size_t used = CountLines(text);
   return text + Table(result, all_rows, std::max(kMaxLines, used + kMinTable) - used);
 }

@@ -20,9 +20,11 @@ class RunReport : public RunObserver {
   void Begin(const Experiment& experiment) override;
   void OnFrame(const SourceFrame& frame) override;
 
-  /// Returns a head line, the verdicts and a table, at most 23 lines in all. The config or their
-  /// relevance selects the rows of the table. If `all_rows` is true, the table is complete.
-  std::string Short(const RunResult& result, bool all_rows) const;
+  /// Returns a head line, the verdicts, the first warnings and conclusions, and a table, at most 23
+  /// lines in all. The config or their relevance selects the rows of the table. If `all_rows` is
+  /// true, the table is complete.
+  std::string Short(const RunResult& result, const std::vector<internal::Conclusion>& conclusions,
+                    bool all_rows) const;
   /// Returns the same with the findings, the conclusions and the events, without a limit.
   std::string Verbose(const RunResult& result, const std::vector<internal::Conclusion>& conclusions,
                       bool all_rows) const;

@@ -261,12 +261,12 @@ TEST_F(DataFault, AnotherUnitIsAWarning) {
     return rows;
   };
   const std::string warning =
-      "ekf: unit\n  sensor 'stereo': most measurements z and their predictions h differ by more "
+      "unit  ekf: sensor 'stereo': most measurements z and their predictions h differ by more "
       "than 100 sigma; is stream 'disparity' in px?";
   const testing::Arguments gated = {"--set", "estimators.ekf.gate=0.999", "--set",
                                     "state.target.initial.depth={mean: 0.3, sigma: 0.01}"};
   Write("table.csv", table(1.0));
-  EXPECT_FALSE(Contains(Run("table.yaml", gated).out, "ekf: unit"));
+  EXPECT_FALSE(Contains(Run("table.yaml", gated).out, "unit  ekf"));
   Write("table.csv", table(1000.0));
   const Outcome slipped = Run("table.yaml", gated);
   EXPECT_TRUE(Contains(slipped.out, warning)) << slipped.out;
@@ -403,7 +403,7 @@ TEST_F(DataFault, ScaleThatNobodyTellsIsReportedAndNoFailure) {
   Write("tracks.csv", Plane(0, 0.0) + Plane(1, 0.01) + Plane(2, 0.02));
   const Outcome alone = Call({"explain", "map.yaml"});
   EXPECT_TRUE(Contains(
-      alone.out, "  unobservable: scale (1 direction)\n    the prior alone determines the scale"))
+      alone.out, "  unobservable: scale (1 direction)\n  the prior alone determines the scale"))
       << alone.out;
   const Outcome at_infinity =
       Call({"explain", "map.yaml", "--set", "landmarks.prior.inverse_distance=0"});
@@ -411,7 +411,7 @@ TEST_F(DataFault, ScaleThatNobodyTellsIsReportedAndNoFailure) {
       << at_infinity.out;
   const Outcome run = Run("map.yaml");
   EXPECT_TRUE(
-      Contains(run.out, "ekf: unobservable\n  no sensor of this estimator determines scale\n"))
+      Contains(run.out, "unobservable  ekf: no sensor of this estimator determines scale\n"))
       << run.out;
   EXPECT_TRUE(Contains(Read("out/run.json"), "\"scale\"")) << Read("out/run.json");
   const char* const observed = "the state is fully observable";

@@ -87,7 +87,7 @@ constexpr std::array<double, 2> kFirst[] = {{97, 82}, {222, 82}, {97, 157}, {222
 TEST_F(RunView, TheVideoHasEachFrameAndItsFeaturesInTheirColours) {
   const Outcome outcome = Run(kPlate, {"--save-video", "plate.avi"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_TRUE(Contains(outcome.out, "wrote plate.avi\n")) << outcome.out;
+  EXPECT_TRUE(Contains(outcome.out, "video    plate.avi\n")) << outcome.out;
   const std::vector<cv::Mat> frames = Frames("plate.avi");
   ASSERT_EQ(frames.size(), 8u);
   for (const cv::Mat& frame : frames) EXPECT_EQ(frame.size(), cv::Size(kWidth, kHeight));

@@ -403,7 +403,7 @@ TEST(CompareSeeds, WhatIsHeldAgainstAReferenceThatDivergedIsLeftOut) {
   EXPECT_EQ(both.withheld,
             "no reference is available: estimator 'ekf' failed, so the comparison with this "
             "estimator is withheld (1 of 2 runs)");
-  const std::string text = CompareReport(both, TableStyle::kText);
+  const std::string text = CompareReport(both, TableStyle::kMarkdown);
   EXPECT_NE(text.find("ratios and differences relative to ekf"), text.npos) << text;
   EXPECT_NE(text.find("runs with a reference"), text.npos) << text;
 }

@@ -43,12 +43,12 @@ TEST(CompareConclusions, LinearisationIsJudgedByTheRatio) {
   };
   const std::string end = ": linearising each measurement only once costs nothing that matters.";
   EXPECT_EQ(lines(1.0001),
-            Lines{"ekf is as accurate as batch in x.position" + end + " (ratio 1.000)"});
+            Lines{"ekf is as accurate as batch in x.position" + end + " (ratio 1.00)"});
   EXPECT_EQ(lines(1.01),
-            Lines{"ekf is within 1 % of batch in x.position" + end + " (ratio 1.010)"});
+            Lines{"ekf is within 1 % of batch in x.position" + end + " (ratio 1.01)"});
   EXPECT_EQ(lines(1.5),
             Lines{"ekf has 50 % more error than batch in x.position, because it linearises each "
-                  "measurement only once. (ratio 1.500)"});
+                  "measurement only once. (ratio 1.50)"});
 }
 
 TEST(CompareConclusions, AnIntervalThatIncludesOneIsNoDifference) {
@@ -64,7 +64,7 @@ TEST(CompareConclusions, AnIntervalThatIncludesOneIsNoDifference) {
 TEST(CompareConclusions, SmoothingDividesTheError) {
   EXPECT_EQ(LinesOf(StepOf(DecompositionKind::kSmoothing, 3.0, 2.0)),
             Lines{"Later data would divide the error of ekf in x.position by 1.5: batch reaches "
-                  "this error. (ratio 1.500)"});
+                  "this error. (ratio 1.50)"});
 }
 
 TEST(CompareConclusions, RejectedMeasurementsHaveACost) {
@@ -73,7 +73,7 @@ TEST(CompareConclusions, RejectedMeasurementsHaveACost) {
   step.values["rejected"].mean = 3.0;
   EXPECT_EQ(LinesOf(step), Lines{"ekf did not use 3 of 100 measurements. A batch without them has "
                                  "10 % more error in x.position than a batch of all measurements. "
-                                 "(ratio 1.100)"});
+                                 "(ratio 1.10)"});
   step.values["rejected"].mean = 0.0;
   EXPECT_EQ(LinesOf(step),
             Lines{"ekf used all 100 measurements: the rejection of outliers cost nothing."});

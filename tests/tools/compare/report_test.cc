@@ -63,7 +63,7 @@ TEST(CompareReport, NamesTheVerdictOrCountsTheRunsWithIt) {
   verdicts[static_cast<std::size_t>(VerdictState::kConsistent)] = 18;
   verdicts[static_cast<std::size_t>(VerdictState::kLost)] = 2;
   const std::string several = CompareReport(comparison, TableStyle::kText);
-  EXPECT_TRUE(Contains(several, "  2 lost, 18 consistent\n")) << several;
+  EXPECT_TRUE(Contains(several, "  2 lost, 18 consistent ")) << several;
 }
 
 // With fewer than ten runs, the report states that there are too few, regardless of their interval.
@@ -84,7 +84,7 @@ TEST(CompareReport, ErrorsByTheirBoundAreNoRatiosToAReference) {
   comparison.runs = 20;
   comparison.estimators[0].ratios["mse_by_bound:p.x"] = {1.2, 1.0, 20, Interval{1.1, 1.3}};
   const std::string text = CompareReport(comparison, TableStyle::kText, ReportRows::kMain);
-  EXPECT_TRUE(Contains(text, "\nMSE / Cramer-Rao bound, p.x  1.2000 [1.1000, 1.3000]\n")) << text;
+  EXPECT_TRUE(Contains(text, "  1.2000 +- 0.1 ")) << text;
   EXPECT_TRUE(Contains(text, "MSE / Cramer-Rao bound: mean square error / smallest")) << text;
   EXPECT_FALSE(Contains(text, "  ratio: mean error")) << text;
 }

@@ -24,7 +24,7 @@ std::string InputsOf(const std::string& data, const std::vector<fs::path>& plugi
                      const std::vector<std::string>& arguments = {"run"}) {
   const std::string path = data.empty() ? "" : ", path: '" + data + '\'';
   const Config config = Config::FromText("source: {type: csv" + path + "}\n", "a.yaml");
-  return InputsJson({arguments, {"/somewhere"}, {}}, config, {config}, HashFiles(plugins));
+  return InputsJson({arguments, {"a.b=1"}, {"/somewhere"}, {}}, config, {config}, HashFiles(plugins));
 }
 
 std::vector<std::string> Differences(const std::string& before, const std::string& now) {
@@ -35,6 +35,7 @@ TEST(RunInputs, AreReadAsTheyWereWritten) {
   const RecordedInputs inputs =
       ReadInputs(InputsOf("", {}, {"run", "--covariances"}), "out/inputs.json");
   EXPECT_EQ(inputs.command.arguments, (std::vector<std::string>{"run", "--covariances"}));
+  EXPECT_EQ(inputs.command.settings, std::vector<std::string>{"a.b=1"});
   EXPECT_EQ(inputs.command.plugin_paths, std::vector<fs::path>{"/somewhere"});
   EXPECT_EQ(inputs.config, "a.yaml");
   EXPECT_EQ(inputs.read_once, "");

@@ -169,8 +169,8 @@ TEST(SweepTable, HasCountsOfVerdictsAndLabelledStatistics) {
       "consistent    2\n"
       "\n"
       "Mean over the used runs, 95 % interval of this mean, and quantiles over the used runs:\n"
-      "        estimator   mean    95 % interval    5 %  median   95 %\n"
-      "rmse x        ekf  3.000  [-3.572, 9.572]  1.100   2.000  5.600\n");
+      "        estimator  mean  95 % interval   5 %  median  95 %\n"
+      "rmse x        ekf  3.00  [-3.57, 9.57]  1.10    2.00  5.60\n");
 }
 
 TEST(SweepTable, ReportsAMeanNeesThatFailsOverTheRuns) {
@@ -215,8 +215,8 @@ TEST(SweepTable, HasARowForEachEstimator) {
     }
   }
   const std::string table = TableOf(result);
-  EXPECT_NE(table.find("\nrmse x        ekf  3.000 "), std::string::npos) << table;
-  EXPECT_NE(table.find("\n                c  3.000 "), std::string::npos) << table;
+  EXPECT_NE(table.find("\nrmse x        ekf  3.00 "), std::string::npos) << table;
+  EXPECT_NE(table.find("\n                c  3.00 "), std::string::npos) << table;
 }
 
 }  // namespace

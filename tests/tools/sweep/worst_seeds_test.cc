@@ -38,7 +38,7 @@ TEST(WorstSeeds, AreFinishedRunsWithTheLargestErrors) {
   ASSERT_EQ(worst.size(), 1u);
   EXPECT_EQ(worst[0].seeds, (std::vector<std::uint64_t>{9, 5, 3}));
   EXPECT_EQ(WorstSeedLines(worst),
-            "\nworst seeds of ekf by rmse target.depth: 9 (9.000 m), 5 (5.000 m), 3 (3.000 m)\n");
+            "\nworst seeds of ekf by rmse target.depth: 9 (9.00 m), 5 (5.00 m), 3 (3.00 m)\n");
 }
 
 TEST(WorstSeeds, AreRankedByNeesIfItExists) {

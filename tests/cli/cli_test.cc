@@ -228,7 +228,7 @@ TEST_F(Cli, BadDataEndsTheRunAndLeavesARecord) {
 TEST_F(Cli, DivergenceEndsTheRunWhereAsked) {
   const Outcome reported = Call(Diverging({"run", "config.yaml"}));
   EXPECT_EQ(reported.code, 0);
-  EXPECT_TRUE(Contains(reported.out, "ekf: diverged")) << reported.out;
+  EXPECT_TRUE(Contains(reported.out, "\ndiverged  ekf: ")) << reported.out;
   const Outcome failed = Call(
       Diverging({"run", "config.yaml", "--force", "--set", "estimators.ekf.on_divergence=fail"}));
   EXPECT_EQ(failed.code, 79);

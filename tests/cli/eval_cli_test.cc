@@ -382,7 +382,7 @@ TEST_F(EvalCli, OfARunSaysWhatTheRunSaid) {
   EXPECT_EQ(text({"eval", "slam/ekf"}), text({"eval", "slam/truth.tum", "slam/ekf"}));
   const Config twice = Evaluated({"slam", "slam", "./slam/ekf"});
   EXPECT_EQ(twice.root().At("evaluations").Items()[0].At("estimate").Text(),
-            "slam/ekf/trajectory_covariance.tum");
+            "slam/ekf/trajectory_covariance");
   const Outcome aligned = Call({"eval", "slam", "slam/ekf", "-as"});
   EXPECT_TRUE(Contains(aligned.out, "NEES withheld: the alignment by sim3 ")) << aligned.out;
 }

@@ -30,7 +30,8 @@ class SweepResumeCli : public ProgramTest {
     const Outcome stopped = Wait(process);
     ASSERT_EQ(stopped.code, 75) << stopped.err;
     EXPECT_TRUE(Contains(stopped.err, " of ")) << stopped.err;
-    EXPECT_TRUE(Contains(stopped.err, " runs; --resume continues the sweep\n")) << stopped.err;
+    EXPECT_TRUE(Contains(stopped.err, " runs; continue with: alidade sweep ")) << stopped.err;
+    EXPECT_TRUE(stopped.err.ends_with(" --resume\n")) << stopped.err;
     EXPECT_FALSE(Exists("out"));
   }
 };

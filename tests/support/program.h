@@ -37,6 +37,14 @@ inline bool Contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
+/// Returns `text` with one blank in place of each sequence of blanks and line ends.
+inline std::string Unwrapped(const std::string& text) {
+  std::istringstream words(text);
+  std::string unwrapped;
+  for (std::string word; words >> word;) unwrapped += word + ' ';
+  return unwrapped;
+}
+
 /// Result of a finished program.
 struct Outcome {
   int code = -1;   ///< exit code; -1 if a signal ended the program

@@ -63,17 +63,23 @@ std::vector<std::string> LinesOf(const std::string& text) {
   return lines;
 }
 
-std::size_t WidestWord(const std::string& text) {
-  std::string words = text;
-  std::ranges::replace(words, ' ', '\n');
-  return std::ranges::max(LinesOf(words), {}, TextWidth).size();
-}
-
-std::string ReplaceAll(std::string text, std::string_view old, std::string_view replacement) {
-  for (std::size_t i = 0; (i = text.find(old, i)) != text.npos; i += replacement.size()) {
-    text.replace(i, old.size(), replacement);
+/// Splits a header into words. A long name is also split after its points.
+std::vector<std::string> WordsOf(const std::string& header) {
+  constexpr std::size_t kLong = 12;
+  std::string text = header;
+  std::ranges::replace(text, ' ', '\n');
+  std::vector<std::string> words;
+  for (const std::string& word : LinesOf(text)) {
+    std::size_t begin = 0;
+    const auto next_point = [&] { return word.find('.', begin); };
+    for (std::size_t point = next_point(); word.size() > kLong && point != word.npos;
+         point = next_point()) {
+      words.push_back(word.substr(begin, point + 1 - begin));
+      begin = point + 1;
+    }
+    words.push_back(word.substr(begin));
   }
-  return text;
+  return words;
 }
 
 /// Column of numbers. Its header may be wrapped, also after the point of a name. The decimal
@@ -88,10 +94,21 @@ class Column {
       if (whole > 0) fraction_ = std::max(fraction_, TextWidth(cell) - whole);
       width_ = std::max(width_, TextWidth(cell));
     }
-    const std::string header = ReplaceAll(table.header[index], ".", ". ");
-    width_ = std::max({width_, whole_ + fraction_, WidestWord(header)});
-    header_ = LinesOf(WrapText(header, width_, 0));
-    for (std::string& line : header_) line = ReplaceAll(line, ". ", ".");
+    constexpr std::size_t kNarrowest = 12;  // width to which a header may extend a column
+    const std::string& header = table.header[index];
+    width_ = std::max({width_, whole_ + fraction_, std::min(kNarrowest, TextWidth(header))});
+    const std::vector<std::string> words = WordsOf(header);
+    for (const std::string& word : words) width_ = std::max(width_, TextWidth(word));
+    header_.emplace_back();
+    for (const std::string& word : words) {
+      std::string& line = header_.back();
+      const std::string gap = line.empty() || line.ends_with('.') ? "" : " ";
+      if (TextWidth(line + gap + word) <= width_) {
+        line += gap + word;
+      } else {
+        header_.push_back(word);
+      }
+    }
   }
   std::size_t width() const { return width_; }
   const std::vector<std::string>& header() const { return header_; }

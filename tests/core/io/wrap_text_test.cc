@@ -39,11 +39,10 @@ TEST(FormatTable, AlignsNumbersAtThePoint) {
 
 TEST(FormatTable, DividesTheTableAndWrapsHeaders) {
   const Table table = MakeTable({"rmse of depth", "NEES"}, {{"ekf", {"1.5", "0.9"}}}, "estimator");
-  EXPECT_EQ(FormatTable(table, TableFormat::kText, 16),
-            "            rmse\n"
-            "              of\n"
-            "estimator  depth\n"
-            "ekf          1.5\n"
+  EXPECT_EQ(FormatTable(table, TableFormat::kText, 24),
+            "             rmse of\n"
+            "estimator      depth\n"
+            "ekf              1.5\n"
             "\n"
             "estimator  NEES\n"
             "ekf         0.9\n");

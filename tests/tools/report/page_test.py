@@ -13,6 +13,7 @@ import math
 import os
 import random
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -649,6 +650,16 @@ class Use(PageCase):
                   .map(p => p.spec.name);""")
             self.assertEqual(empty, [])
 
+    def test_narrow_and_dark(self):
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+            "width": 390, "height": 900, "deviceScaleFactor": 1, "mobile": False})
+        try:
+            self.open_depth()
+            self.script("alidadeReport.setTheme(true); alidadeReport.plots.forEach(p => p.draw())")
+            self.expect_sound()
+        finally:
+            self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
 
 class Hostile(PageCase):
     def test_hostile_texts_are_shown(self):
@@ -674,7 +685,8 @@ class Hostile(PageCase):
         self.open("hostile_names", "run", file, "--set", f"title='{ATTACK[:9]}'")
         self.assertEqual(self.last.returncode, 0, self.last.stderr)
         self.expect_not_attacked()
-        self.assertIn(ATTACK, self.script("return document.querySelector('.cmd').textContent"))
+        command = self.script("return document.querySelector('.cmd').textContent")
+        self.assertEqual(shlex.split(command)[2], file.name)
         texts = self.script("return document.querySelector('#config').textContent")
         self.assertIn(ATTACK, texts)
 
@@ -717,6 +729,8 @@ class Hostile(PageCase):
         text = self.script("return document.getElementById('failure').innerText")
         self.assertIn(row, text)
 
+
+class Live(PageCase):
     def start_live(self, name, config, *arguments):
         """Starts a run with a live page and a pipe as the source. Returns process, pipe, address."""
         pipe = self.root / (name + ".pipe")
@@ -789,6 +803,8 @@ class Hostile(PageCase):
         self.wait_for("document.querySelector('.live').innerText.includes('program has ended')",
                       "the page does not show that the program is gone")
 
+
+class Explanations(PageCase):
     def open_explanation(self, name, config, *arguments):
         page = self.root / (name + ".html")
         written = self.alidade("explain", config, "-o", page, *arguments)
@@ -836,16 +852,6 @@ class Hostile(PageCase):
             "width": 390, "height": 900, "deviceScaleFactor": 1, "mobile": False})
         try:
             self.open_explanation("narrow", "10_slam_scene/config.yaml")
-        finally:
-            self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-
-    def test_narrow_and_dark(self):
-        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
-            "width": 390, "height": 900, "deviceScaleFactor": 1, "mobile": False})
-        try:
-            self.open_depth()
-            self.script("alidadeReport.setTheme(true); alidadeReport.plots.forEach(p => p.draw())")
-            self.expect_sound()
         finally:
             self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 

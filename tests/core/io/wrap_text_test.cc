@@ -40,9 +40,9 @@ TEST(FormatTable, AlignsNumbersAtThePoint) {
 TEST(FormatTable, DividesTheTableAndWrapsHeaders) {
   const Table table = MakeTable({"rmse of depth", "NEES"}, {{"ekf", {"1.5", "0.9"}}}, "estimator");
   EXPECT_EQ(FormatTable(table, TableFormat::kText, 24),
-            "             rmse of\n"
-            "estimator      depth\n"
-            "ekf              1.5\n"
+            "                rmse of\n"
+            "estimator         depth\n"
+            "ekf                 1.5\n"
             "\n"
             "estimator  NEES\n"
             "ekf         0.9\n");

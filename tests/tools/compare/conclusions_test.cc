@@ -44,8 +44,7 @@ TEST(CompareConclusions, LinearisationIsJudgedByTheRatio) {
   const std::string end = ": linearising each measurement only once costs nothing that matters.";
   EXPECT_EQ(lines(1.0001),
             Lines{"ekf is as accurate as batch in x.position" + end + " (ratio 1.00)"});
-  EXPECT_EQ(lines(1.01),
-            Lines{"ekf is within 1 % of batch in x.position" + end + " (ratio 1.01)"});
+  EXPECT_EQ(lines(1.01), Lines{"ekf is within 1 % of batch in x.position" + end + " (ratio 1.01)"});
   EXPECT_EQ(lines(1.5),
             Lines{"ekf has 50 % more error than batch in x.position, because it linearises each "
                   "measurement only once. (ratio 1.50)"});

@@ -24,7 +24,8 @@ std::string InputsOf(const std::string& data, const std::vector<fs::path>& plugi
                      const std::vector<std::string>& arguments = {"run"}) {
   const std::string path = data.empty() ? "" : ", path: '" + data + '\'';
   const Config config = Config::FromText("source: {type: csv" + path + "}\n", "a.yaml");
-  return InputsJson({arguments, {"a.b=1"}, {"/somewhere"}, {}}, config, {config}, HashFiles(plugins));
+  return InputsJson({arguments, {"a.b=1"}, {"/somewhere"}, {}}, config, {config},
+                    HashFiles(plugins));
 }
 
 std::vector<std::string> Differences(const std::string& before, const std::string& now) {

@@ -100,7 +100,7 @@ std::optional<Conclusion> Rejected(const DecompositionStep& step, const Comparis
   const auto rejected = step.values.find("rejected"), total = step.values.find("measurements");
   if (rejected == step.values.end() || total == step.values.end()) return std::nullopt;
   const std::string mean = comparison.runs > 1 ? " (mean of the runs)" : "";
-  const std::string count = RoundedText(total->second.mean, 6) + " measurements" + mean;
+  const std::string count = RoundedText(total->second.mean, 5) + " measurements" + mean;
   if (rejected->second.mean == 0.0) {
     return Conclusion{
         Tone::kGood,
@@ -108,7 +108,7 @@ std::optional<Conclusion> Rejected(const DecompositionStep& step, const Comparis
         ""};
   }
   std::string text = comparison.decomposed + " did not use " +
-                     RoundedText(rejected->second.mean, 6) + " of " + count + '.';
+                     RoundedText(rejected->second.mean, 3) + " of " + count + '.';
   const auto main = MainRatio(step);
   if (!main) return Conclusion{Tone::kNeutral, text, ""};
   text += main->is_decided() ? " A batch without them has " + ChangeText(main->change()) + " in " +

@@ -144,8 +144,8 @@ Json RunData(const fs::path& folder, const Json& run, const Node& config, const 
   if (estimators.empty()) return {};
   std::ranges::sort(timestamps);
   const fs::path truth_file = folder / "truth.csv", implied_file = folder / "implied_states.csv";
-  const CsvColumns truth(truth_file, rows.are_growing() ? LastRows(rows.last)
-                                                        : SelectTimes(truth_file, timestamps));
+  const CsvColumns truth(
+      truth_file, rows.are_growing() ? LastRows(rows.last) : SelectTimes(truth_file, timestamps));
   const std::vector<Timestamp> truth_times = truth.Times();
   timestamps.insert(timestamps.end(), truth_times.begin(), truth_times.end());
   if (timestamps.empty()) return {};

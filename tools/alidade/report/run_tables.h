@@ -15,7 +15,7 @@ namespace alidade::internal {
 
 /// Rows of the files of a run that a page shows. By default, these are all rows of a finished run.
 struct RunRows {
-  std::size_t last = kAllRows;  ///< number of rows at the end of each file
+  std::size_t last = kAllRows;      ///< number of rows at the end of each file
   Timestamp origin = kNoTimestamp;  ///< zero of the times; kNoTimestamp: the first timestamp
 
   /// Returns whether the run is still writing its files.

@@ -100,7 +100,7 @@ ExitCode Replay(const ReplayArguments& arguments,
   const fs::path repeated =
       arguments.output.empty() ? scratch.path() / "made/again" : fs::path(arguments.output);
   const ExitCode code = RepeatCommand(recorded, folder, scratch.path(), repeated, execute);
-  if (StopRequested()) return ExitCode::kStopped;  // after a stop, figures may be missing
+  if (StopRequested()) return ExitCode::kStopped;
   std::error_code ignored;
   const bool is_complete = fs::exists(repeated / internal::kInputsFile, ignored);
   if (code == ExitCode::kStopped || code == ExitCode::kUsage || !is_complete) return code;

@@ -39,9 +39,8 @@ enum class TableFormat {
   kLatex,     ///< a `tabular` environment, which needs no package; special characters are escaped
 };
 /// Formats a table. `width` is the width of lines for kText. If the table is wider, it is split
-/// into
-/// parts, and labels are wrapped if one column needs this. Headers that are wider than the cells
-/// are always wrapped.
+/// into parts, and labels are wrapped if one column needs this. Headers that are wider than the
+/// cells are always wrapped.
 std::string FormatTable(const Table& table, TableFormat format,
                         std::size_t width = kDefaultTextWidth);
 

@@ -351,7 +351,7 @@ class RunPages(PageCase):
         self.open_stopped()
         text = self.script("return document.getElementById('failure').innerText")
         self.assertIn("The run was stopped", text)
-        self.assertIn("--resume", text)
+        self.assertIn("Repeat: alidade run compare.yaml", " ".join(text.split()))
         state = self.table("#last .panel:nth-of-type(1) table")
         self.assertIn("target.depth", [row[1] for row in state])
 
@@ -831,9 +831,8 @@ class Explanations(PageCase):
         self.assertIn("sensors.stereo.focal_px", keys)
 
     def test_explanations_of_other_models(self):
-        for example in ("10_slam_scene", "08_slam_odometry"):
-            if (EXAMPLES / example / "config.yaml").exists():
-                self.open_explanation(example, example + "/config.yaml")
+        for example in ("10_slam_scene", "13_slam_odometry_tracks"):
+            self.open_explanation(example, example + "/config.yaml")
 
     def test_hostile_texts_are_explained(self):
         (self.root / "data.csv").write_text("t_s,disparity_px\n0,86\n")

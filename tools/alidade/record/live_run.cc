@@ -80,11 +80,11 @@ LiveRun::Impl::Impl(std::uint16_t port, const std::filesystem::path& run_folder,
 }
 
 Json LiveRun::Impl::Data(internal::ColumnPool& pool) const {
-  const internal::RunRows rows{kRows, first};
+  const internal::RunRows rows{kRows, first};  // `first` may be set at any time
   Json data = {{"title", title},
                {"status", "running"},
                {"live", {{"rows", kRows}, {"dropped", server.dropped()}}}};
-  if (first != kNoTimestamp) {
+  if (rows.origin != kNoTimestamp) {
     data["run"] = internal::RunData(partial, run, config.root(), rows, pool);
   }
   return data;

@@ -20,12 +20,12 @@ constexpr const char* kResolvedConfig = "config.resolved.yaml";
 struct CommandInputs {
   /// The command and the options that affect the output, as in {"run", "--covariances"}. Excludes
   /// the config, and options whose values are part of the resolved config.
-  std::vector<std::string> arguments;
-  std::vector<std::string> settings;  ///< values of --set, for the command that the page shows
-  std::vector<std::filesystem::path> plugin_paths;  ///< paths from --plugin-path
+  std::vector<std::string> arguments = {};
+  std::vector<std::string> settings = {};  ///< values of --set, for the command that the page shows
+  std::vector<std::filesystem::path> plugin_paths = {};  ///< paths from --plugin-path
   /// Folders of plugins from the environment. Unlike in `plugin_paths`, a rejected plugin in these
   /// folders is not an error. The folders are not compared.
-  std::vector<std::filesystem::path> plugin_folders;
+  std::vector<std::filesystem::path> plugin_folders = {};
 };
 
 /// Returns each plugin file that runs of these configs use. A plugin is used if any `model` or

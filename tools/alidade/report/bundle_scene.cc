@@ -30,7 +30,7 @@ void AppendPoints(const fs::path& file, PageTrajectory& cameras) {
   const std::size_t step = 1 + (x.size() - (x.empty() ? 0 : 1)) / kScenePoints;
   for (std::size_t i = 0; i < x.size(); i += step) {
     cameras.points.push_back({x[i], y[i], z[i]});
-    cameras.point_ids.push_back(static_cast<std::uint32_t>(id[i]));
+    cameras.point_ids.push_back(id[i]);
   }
 }
 

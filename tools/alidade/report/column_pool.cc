@@ -146,6 +146,15 @@ int ColumnPool::AddIntegers(std::span<const std::uint32_t> values) {
   return Add(NarrowIntegers<std::uint32_t>("u4", values));
 }
 
+int ColumnPool::AddIds(std::span<const double> values) {
+  std::vector<double> ids(values.begin(), values.end());
+  std::ranges::replace_if(
+      ids, [](double id) { return std::isnan(id); }, 0.0);
+  const auto is_small = [](double id) { return id <= std::numeric_limits<std::uint32_t>::max(); };
+  if (!std::ranges::all_of(ids, is_small)) return Add(Binary("f8", ids));
+  return AddIntegers(std::vector<std::uint32_t>(ids.begin(), ids.end()));
+}
+
 int ColumnPool::AddTimes(std::span<const Timestamp> times, Timestamp origin) {
   bool is_regular = times.size() > 1;
   for (std::size_t i = 2; i < times.size(); ++i) {

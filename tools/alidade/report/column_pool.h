@@ -29,6 +29,8 @@ class ColumnPool {
   int AddCloud(std::span<const double> values, double resolution = 0.0);
   /// Adds whole numbers from 0 to 2^32 - 1.
   int AddIntegers(std::span<const std::uint32_t> values);
+  /// Adds ids: whole numbers from 0 to 2^53. NaN counts as 0.
+  int AddIds(std::span<const double> values);
   /// Adds times in seconds after `origin`.
   int AddTimes(std::span<const Timestamp> times, Timestamp origin);
   /// Adds the elements `indices` of column `source`.

@@ -8,8 +8,8 @@
 
 namespace alidade::internal {
 
-/// Sentence about the results of a comparison or a sweep. The terminal, the JSON file and the page
-/// show the same sentence.
+/// Sentence about the results of a command. The terminal, the JSON file and the page show the same
+/// sentence.
 struct Conclusion {
   enum class Tone { kGood, kNeutral, kWarning, kBad };
 

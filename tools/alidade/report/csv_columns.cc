@@ -17,7 +17,7 @@ CsvColumns::CsvColumns(const std::filesystem::path& file, const RowSelection& se
   CsvRows table(file, selection.last);
   names_ = table.names();
   const auto& rows = selection.rows;
-  for (std::size_t next = 0; table.Next(); ++total_rows_) {
+  for (std::size_t next = 0; table.Next();) {
     if (rows) {
       if (next == rows->size() || (*rows)[next] != table.row()) continue;
       ++next;

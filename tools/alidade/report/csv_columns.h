@@ -24,10 +24,7 @@ class CsvColumns {
   CsvColumns& operator=(const CsvColumns&) = delete;
 
   std::size_t rows() const { return lines_.size(); }
-  /// Returns the number of rows of the file.
-  std::size_t total_rows() const { return total_rows_; }
   const std::vector<std::string>& names() const { return names_; }
-  bool Has(std::string_view name) const { return Find(name).has_value(); }
 
   /// Returns the texts of a column; empty if the column is missing.
   std::vector<std::string_view> Texts(std::string_view name) const;
@@ -47,7 +44,6 @@ class CsvColumns {
   std::vector<std::uint32_t> lines_;  ///< index of each selected row in the file
   std::string text_;                  ///< texts of all cells, row by row
   std::vector<std::size_t> ends_;     ///< end of each cell in `text_`
-  std::size_t total_rows_ = 0;
 };
 
 /// Returns the elements of `values` at `indices`.

@@ -68,7 +68,7 @@ Json BlockData(const EstimatorTables& tables, const Json& block, const Json& col
   for (const std::string& column : values.names) {
     value.push_back(pool.AddNumbers(tables.estimates.Numbers(column)));
   }
-  const bool has_errors = tables.errors.total_rows() == tables.estimates.total_rows();
+  const bool has_errors = tables.errors.rows() == tables.estimates.rows();
   return {{"name", name},
           {"unit", block.at("unit")},
           {"geometry", block.at("geometry")},
@@ -84,7 +84,7 @@ Json BlockData(const EstimatorTables& tables, const Json& block, const Json& col
 Json NeesData(const EstimatorTables& tables, ColumnPool& pool) {
   const std::string_view prefix = "nees:";
   Json list = Json::array();
-  if (tables.errors.total_rows() != tables.estimates.total_rows()) return list;
+  if (tables.errors.rows() != tables.estimates.rows()) return list;
   for (const std::string_view name : tables.errors.names()) {
     if (!name.starts_with(prefix)) continue;
     const std::string owner(name.substr(prefix.size()));
@@ -150,8 +150,9 @@ Json PositionCovariance(const EstimatorTables& tables, ColumnPool& pool) {
   NumberRows rows(tables.covariance_file, Place{tables.covariance_file.string()}, {}, ' ');
   while (rows.Next()) {
     rows.ExpectColumns(20, "as in the comment at the start of the file");
-    const auto found = std::ranges::lower_bound(times, rows.Time(0, "t"));
-    if (found == times.end()) continue;
+    const Timestamp time = rows.Time(0, "t");
+    const auto found = std::ranges::lower_bound(times, time);
+    if (found == times.end() || *found != time) continue;
     for (std::size_t i = 0; i < kColumns.size(); ++i) {
       covariances[i][static_cast<std::size_t>(found - times.begin())] =
           rows.Number(kColumns[i], "Pt");
@@ -184,11 +185,7 @@ Json LandmarkData(const CsvColumns& table, const RunTimes& times, ColumnPool& po
   }
   if (rows.empty()) return {};
   Json data;
-  std::vector<std::uint32_t> ids;
-  for (const double id : Select(table.Numbers("id"), rows)) {
-    ids.push_back(static_cast<std::uint32_t>(id));
-  }
-  data["id"] = pool.AddIntegers(ids);
+  data["id"] = pool.AddIds(Select(table.Numbers("id"), rows));
   for (const auto& [key, column] : kColumns) {
     data[key] = pool.AddNumbers(Select(table.Numbers(column), rows));
   }

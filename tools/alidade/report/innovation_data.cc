@@ -33,14 +33,10 @@ std::vector<std::uint32_t> OutcomeCodes(const SensorRows& sensor) {
 }
 
 /// Returns the ids of the landmarks. Returns an empty list if no measurement has an id.
-std::vector<std::uint32_t> LandmarkIds(const SensorRows& sensor) {
-  std::vector<std::uint32_t> ids;
-  bool has_id = false;
-  for (const double id : sensor.Numbers("landmark")) {
-    has_id = has_id || std::isfinite(id);
-    ids.push_back(std::isfinite(id) ? static_cast<std::uint32_t>(id) : 0);
-  }
-  return has_id ? ids : std::vector<std::uint32_t>{};
+std::vector<double> LandmarkIds(const SensorRows& sensor) {
+  std::vector<double> ids = sensor.Numbers("landmark");
+  const bool has_id = std::ranges::any_of(ids, [](double id) { return std::isfinite(id); });
+  return has_id ? ids : std::vector<double>{};
 }
 
 /// Adds the elements `letter`0 to `letter`(size - 1) of each row.
@@ -87,8 +83,8 @@ Json SensorData(const std::string& name, const Json& description, const SensorRo
                {"t", times.ColumnOf(Select(sensor.table.Times(), sensor.rows))},
                {"outcome", pool.AddIntegers(OutcomeCodes(sensor))},
                {"nis", pool.AddSeries(sensor.Numbers("nis"))}};
-  const std::vector<std::uint32_t> ids = LandmarkIds(sensor);
-  if (!ids.empty()) data["landmark"] = pool.AddIntegers(ids);
+  const std::vector<double> ids = LandmarkIds(sensor);
+  if (!ids.empty()) data["landmark"] = pool.AddIds(ids);
   if (!ids.empty() && sensor.rows.size() > kMaxExactRows) {
     AddClouds(sensor, dof, data, pool);
     return data;

@@ -100,6 +100,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
                        error ? self->Close() : self->Answer();
                      });
   }
+  bool has_request() const { return has_request_; }
   bool has_events() const { return has_events_; }
   bool is_sending() const { return is_sending_; }
   /// Sends an event. Must not be called while is_sending() is true.
@@ -128,6 +129,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
  private:
   void Answer() {
+    has_request_ = true;
     const auto& request = parser_.get();
     const auto host = request[http::field::host];
     if (!IsThisComputer({host.data(), host.size()})) {
@@ -147,7 +149,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     std::string page;
     try {
       page = hub_.content.page();
-    } catch (const Error&) {  // for example, the run renames its folder at this moment
+    } catch (const std::exception&) {  // for example, the run renames its folder at this moment
       Respond(http::status::service_unavailable, "The page is not ready. Load it again.\n");
       return;
     }
@@ -204,7 +206,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   http::response<http::string_body> response_;
   std::string sent_, last_;
   std::array<char, 1> byte_{};
-  bool has_events_ = false, is_sending_ = false, is_last_ = false;
+  bool has_request_ = false, has_events_ = false, is_sending_ = false, is_last_ = false;
 };
 
 }  // namespace live
@@ -223,7 +225,7 @@ struct LiveServer::Impl {
 
   asio::io_context context{1};
   tcp::acceptor acceptor{context};
-  asio::steady_timer timer{context};
+  asio::steady_timer timer{context}, retry{context};
   std::uint16_t opened_port = 0;
   live::Hub hub;
   std::string last_update;
@@ -255,7 +257,12 @@ void LiveServer::Impl::Accept() {
       hub.connections.insert(connection);
       connection->Read();
     }
-    Accept();
+    if (!error) return Accept();
+    // For example, the process has no free file descriptor.
+    retry.expires_after(kMinInterval);
+    retry.async_wait([this](error_code stopped) {
+      if (!stopped && !hub.is_finished) Accept();
+    });
   });
 }
 
@@ -265,7 +272,7 @@ void LiveServer::Impl::SendUpdate() {
   std::string update;
   try {
     update = hub.content.update();
-  } catch (const Error&) {  // the run is writing the files; the next update will succeed
+  } catch (const std::exception&) {  // the run is writing the files; the next update will succeed
   }
   if (update.empty() || update == last_update) return;
   last_update = std::move(update);
@@ -299,6 +306,7 @@ void LiveServer::Impl::Finish(const std::string& data) {
   timer.async_wait([this](error_code) { context.stop(); });
   for (const auto& connection : std::set(hub.connections)) {
     if (connection->has_events()) connection->SendLast("event: end\ndata: " + data + "\n\n");
+    if (!connection->has_request()) connection->Close();
   }
   if (hub.connections.empty()) context.stop();
 }

@@ -64,17 +64,26 @@ std::string ConfigName(const Folder& folder) {
   return folder.inputs.contains("config") ? folder.inputs.at("config").value("file", "") : "";
 }
 
+/// Returns `alidade COMMAND CONFIG` with the recorded options --set.
+std::string CommandWithConfig(const Folder& folder, const std::string& command) {
+  const std::string name = ConfigName(folder);
+  std::string text =
+      "alidade " + command + ' ' + (name.empty() ? "CONFIG" : internal::ShellWord(name));
+  if (!folder.inputs.contains("settings")) return text;
+  for (const Json& setting : folder.inputs.at("settings")) {
+    text += " --set " + internal::ShellWord(setting.get<std::string>());
+  }
+  return text;
+}
+
 /// Returns the command that repeats the folder, without -o; "" if it is not recorded.
 std::string CommandOf(const Folder& folder) {
   if (!folder.inputs.contains("arguments")) return "";
-  auto arguments = folder.inputs.at("arguments").get<std::vector<std::string>>();
+  const auto arguments = folder.inputs.at("arguments").get<std::vector<std::string>>();
   if (arguments.empty()) return "";
-  std::vector<std::string> inserted = {internal::ShellWord(ConfigName(folder))};
-  for (const Json& setting : folder.inputs.value("settings", Json::array())) {
-    inserted.push_back("--set " + internal::ShellWord(setting.get<std::string>()));
-  }
-  arguments.insert(arguments.begin() + 1, inserted.begin(), inserted.end());
-  return "alidade " + internal::Join(arguments, " ");
+  std::string text = CommandWithConfig(folder, arguments.front());
+  for (std::size_t i = 1; i < arguments.size(); ++i) text += ' ' + arguments[i];
+  return text;
 }
 
 /// Returns the place, the message and the quoted lines of an error, or null if the reason does not
@@ -151,7 +160,8 @@ Json DataOf(const Folder& folder, internal::ColumnPool& pool) try {
     data["compare"] = internal::ComparisonData(folder.path, folder.comparison, pool);
   }
   if (!folder.sweep.is_null()) {
-    data["sweep"] = internal::SweepData(folder.path, folder.sweep, pool);
+    data["sweep"] =
+        internal::SweepData(folder.path, folder.sweep, CommandWithConfig(folder, "run"), pool);
   }
   if (!folder.bundle.is_null()) {
     data["bundle"] = internal::BundleData(folder.path, folder.bundle, pool);

@@ -77,10 +77,10 @@ Json ImpliedData(const CsvColumns& implied, const RunTimes& times, ColumnPool& p
 
 /// Returns for each timestamp whether any estimator received a valid measurement of `sensor`.
 std::vector<bool> HasValid(const std::deque<EstimatorTables>& estimators, const std::string& sensor,
-                           const RunTimes& times) {
+                           const RunTimes& times, std::size_t last_rows) {
   std::vector<bool> has_valid(times.all().size());
   for (const EstimatorTables& estimator : estimators) {
-    CsvRows table(estimator.innovations_file);
+    CsvRows table(estimator.innovations_file, last_rows);
     const auto name = table.Find("sensor"), outcome = table.Find("outcome"), t = table.Find("t_s");
     while (name && outcome && t && table.Next()) {
       const std::vector<std::string_view>& cells = table.cells();
@@ -109,7 +109,7 @@ Json SpansOf(const RunTimes& times, const std::vector<bool>& has_valid, bool wit
 }
 
 Json SegmentData(const Node& config, const std::deque<EstimatorTables>& estimators,
-                 const RunTimes& times) {
+                 const RunTimes& times, std::size_t last_rows) {
   Json list = Json::array();
   const auto evaluate = config.Find("evaluate");
   const auto segments = evaluate ? evaluate->Find("segments") : std::nullopt;
@@ -118,7 +118,7 @@ Json SegmentData(const Node& config, const std::deque<EstimatorTables>& estimato
     const bool needs_measurement = rule.Find("with").has_value();
     const char* const key = needs_measurement ? "with" : "without";
     const std::string sensor = rule.At(key).Text();
-    const std::vector<bool> has_valid = HasValid(estimators, sensor, times);
+    const std::vector<bool> has_valid = HasValid(estimators, sensor, times, last_rows);
     list.push_back({{"name", name},
                     {"rule", key + (' ' + sensor)},
                     {"spans", SpansOf(times, has_valid, needs_measurement)}});
@@ -136,7 +136,7 @@ Json RunData(const fs::path& folder, const Json& run, const Node& config, const 
   for (const auto& [name, entry] : run.at("estimators").items()) {
     if (!entry.contains("blocks")) continue;  // the run ended before the files were created
     const EstimatorTables& tables = estimators.emplace_back(folder, name, entry, rows);
-    for (const CsvColumns* table : {&tables.estimates, &tables.innovations}) {
+    for (const CsvColumns* table : {&tables.estimates, &tables.innovations, &tables.gains}) {
       const std::vector<Timestamp> more = table->Times();
       timestamps.insert(timestamps.end(), more.begin(), more.end());
     }
@@ -153,7 +153,7 @@ Json RunData(const fs::path& folder, const Json& run, const Node& config, const 
   const Json columns = ReadJsonFile(folder / "columns.json");
   const CsvColumns implied(implied_file, rows.are_growing()
                                              ? LastRows(rows.last)
-                                             : SelectRows(implied_file, {"sensor"}, ""));
+                                             : SelectTimes(implied_file, times.all()));
   // The page of a run that failed or was stopped shows the measurements of the last frames.
   const bool is_complete = rows.are_growing() || run.value("status", "ok") == "ok";
   Json data = {{"t", times.column()},
@@ -161,7 +161,7 @@ Json RunData(const fs::path& folder, const Json& run, const Node& config, const 
                {"outcomes", OutcomeList()},
                {"truth", TruthData(truth, times, pool)},
                {"implied", ImpliedData(implied, times, pool)},
-               {"segments", SegmentData(config, estimators, times)},
+               {"segments", SegmentData(config, estimators, times, rows.last)},
                {"conclusions", run.value("conclusions", Json::array())}};
   Json& list = data["estimators"] = Json::array();
   for (const EstimatorTables& tables : estimators) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 #include <set>
+#include <span>
 
 #include "alidade/report/csv_rows.h"
 #include "alidade/report/row_selection.h"
@@ -20,12 +21,17 @@ RowSelection EstimateRows(const std::filesystem::path& folder, const RunRows& ro
   return SelectRows(folder / (has_errors ? "errors.csv" : "estimates.csv"), {}, "nees:");
 }
 
+std::filesystem::path GainFile(const std::filesystem::path& folder, const RunRows& rows) {
+  return rows.are_growing() ? std::filesystem::path() : folder / "gains.csv";
+}
+
 RowSelection InnovationRows(const std::filesystem::path& file, const RunRows& rows) {
   if (rows.are_growing()) return LastRows(rows.last);
   return SelectRows(file, {"sensor", "outcome"}, "nis");
 }
 
-/// Removes rows so that both tables have the same number of rows and end at the same timestamp.
+/// If both tables have the same timestamps except at their ends, removes rows so that both have the
+/// same number of rows and end at the same timestamp.
 void Align(CsvColumns& a, CsvColumns& b) {
   const std::vector<Timestamp> a_times = a.Times(), b_times = b.Times();
   if (a_times.empty() || b_times.empty()) return;
@@ -35,6 +41,10 @@ void Align(CsvColumns& a, CsvColumns& b) {
   };
   const std::size_t a_count = count_until(a_times), b_count = count_until(b_times);
   const std::size_t count = std::min(a_count, b_count);
+  const auto last_of = [&](const std::vector<Timestamp>& times, std::size_t end) {
+    return std::span(times).subspan(end - count, count);
+  };
+  if (!std::ranges::equal(last_of(a_times, a_count), last_of(b_times, b_count))) return;
   a.Keep(a_count - count, count);
   b.Keep(b_count - count, count);
 }
@@ -57,18 +67,19 @@ EstimatorTables::EstimatorTables(const std::filesystem::path& folder, const std:
     : name(estimator),
       entry(run_entry),
       covariance_file(folder / name / "trajectory_covariance.tum"),
-      errors(folder / name / "errors.csv", EstimateRows(folder / name, rows)),
-      estimates(folder / name / "estimates.csv", EstimateRows(folder / name, rows)),
+      estimate_rows(EstimateRows(folder / name, rows)),
+      errors(folder / name / "errors.csv", estimate_rows),
+      estimates(folder / name / "estimates.csv", estimate_rows),
       innovations_file(folder / name / "innovations.csv"),
       innovations(innovations_file, InnovationRows(innovations_file, rows)),
-      gains(rows.are_growing() ? std::filesystem::path() : folder / name / "gains.csv",
-            SelectRows(folder / name / "gains.csv", {"sensor"}, "", kMaxGainRows)),
+      gains(GainFile(folder / name, rows),
+            SelectRows(GainFile(folder / name, rows), {"sensor"}, "", kMaxGainRows)),
       landmarks(folder / name / "landmarks.csv"),
       events(folder / name / "events.csv"),
       final_covariance(folder / name / "final_covariance.csv") {
+  Align(estimates, errors);
   if (!rows.are_growing()) return;
   covariance_file.clear();
-  Align(estimates, errors);
   counts = CountOutcomes(innovations);
 }
 

@@ -22,22 +22,24 @@ struct RunRows {
   bool are_growing() const { return last != kAllRows; }
 };
 
-/// Files of one estimator in a run folder. Of long files, only selected rows are read: each
-/// rejected measurement is a row of a group of its own, so that accepted ones do not displace it.
+/// Files of one estimator in a run folder. Of long files, only selected rows are read. In
+/// innovations.csv, each sensor and outcome is a group, so accepted measurements do not displace
+/// rejected ones.
 struct EstimatorTables {
-  /// The last rows of `estimates` and `errors` have the same timestamps, also while the run writes
-  /// these files. Gains and covariances of the poses of a run that is not finished are omitted.
+  /// The rows of `estimates` and `errors` have the same timestamps, also while the run writes these
+  /// files, and if it was killed. Gains and covariances of the poses of a run that is not finished are omitted.
   EstimatorTables(const std::filesystem::path& folder, const std::string& estimator,
                   const Json& run_entry, const RunRows& rows);
 
   std::string name;
   const Json& entry;  ///< entry of the estimator in run.json
   std::filesystem::path covariance_file;
+  RowSelection estimate_rows;  ///< of both files
   CsvColumns errors, estimates;
   std::filesystem::path innovations_file;
   CsvColumns innovations, gains, landmarks, events, final_covariance;
-  /// Number of innovations of each outcome and sensor, if the run is not finished: otherwise
-  /// `entry` contains these numbers.
+  /// Number of the innovations that were read, for each outcome and sensor, if the run is not
+  /// finished: otherwise `entry` contains the numbers of all.
   std::map<std::string, std::int64_t> counts;
 };
 

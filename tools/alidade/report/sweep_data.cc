@@ -79,26 +79,21 @@ std::vector<std::string> ShownMetrics(const CsvColumns& runs) {
   return metrics;
 }
 
-std::vector<std::uint32_t> IntegersOf(const std::vector<double>& numbers) {
-  std::vector<std::uint32_t> integers;
-  for (const double number : numbers) integers.push_back(static_cast<std::uint32_t>(number));
-  return integers;
-}
-
 /// Value of the varied key. The value is "" if the sweep varies only the seed.
 struct VariedValue {
   std::string value, label;
-  std::string options;  ///< options of `alidade run` that set the value
 };
 
-/// Returns the options that set the varied keys of a config.
-std::string OptionsOf(const Json& sweep, const std::string& value) {
+/// Returns the options of `alidade run` that set the varied keys for an estimator.
+std::string OptionsOf(const Json& sweep, const std::string& value, const std::string& estimator) {
   const std::string keys = sweep.value("vary", "");
-  if (keys.empty() || sweep.value("scope", "") != "config") return "";
+  const bool is_override = sweep.value("scope", "") == "estimators";
+  const std::string prefix = is_override ? "estimators." + estimator + ".overrides." : "";
+  if (keys.empty()) return "";
   std::string options;
   for (std::size_t begin = 0; begin <= keys.size();) {
     const std::size_t end = std::min(keys.find('+', begin), keys.size());
-    options += " --set " + ShellWord(keys.substr(begin, end - begin) + '=' + value);
+    options += " --set " + ShellWord(prefix + keys.substr(begin, end - begin) + '=' + value);
     begin = end + 1;
   }
   return options;
@@ -106,13 +101,13 @@ std::string OptionsOf(const Json& sweep, const std::string& value) {
 
 /// Returns all values of the varied key.
 std::vector<VariedValue> ValuesOf(const Json& sweep) {
-  if (!sweep.contains("values")) return {{"", "", ""}};
+  if (!sweep.contains("values")) return {{"", ""}};
   std::vector<std::string> values;
   for (const Json& part : sweep.at("values")) values.push_back(part.at("value"));
   const std::vector<std::string> labels = ValueLabels(values);
   std::vector<VariedValue> varied;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    varied.push_back({values[i], labels[i], OptionsOf(sweep, values[i])});
+    varied.push_back({values[i], labels[i]});
   }
   return varied;
 }
@@ -138,7 +133,7 @@ struct SweepRuns {
 /// Returns the runs of an estimator with one value of the varied key. `entry` is its summary in
 /// sweep.json.
 Json GroupOf(const SweepRuns& runs, const std::string& estimator, const VariedValue& value,
-             const Json& entry, ColumnPool& pool) {
+             const std::string& command, const Json& entry, ColumnPool& pool) {
   const std::vector<std::uint32_t> rows = runs.RowsOf(estimator, value.value);
   std::vector<std::uint32_t> diverged;
   for (const std::string_view verdict : Select(runs.table.Texts("verdict"), rows)) {
@@ -158,8 +153,8 @@ Json GroupOf(const SweepRuns& runs, const std::string& estimator, const VariedVa
   return {{"estimator", estimator},
           {"value", runs.varied_key.empty() ? Json() : Json(value.value)},
           {"label", value.label},
-          {"options", value.options},
-          {"seed", pool.AddIntegers(IntegersOf(Select(runs.table.Numbers("seed"), rows)))},
+          {"command", command},
+          {"seeds", Select(runs.table.Texts("seed"), rows)},
           {"diverged", pool.AddIntegers(diverged)},
           {"verdicts", entry.value("verdicts", Json::object())},
           {"columns", columns},
@@ -197,7 +192,8 @@ Json ReprojectionData(const CsvColumns& table, const std::string& varied_key, Co
 
 }  // namespace
 
-Json SweepData(const std::filesystem::path& folder, const Json& sweep, ColumnPool& pool) {
+Json SweepData(const std::filesystem::path& folder, const Json& sweep,
+               const std::string& run_command, ColumnPool& pool) {
   const CsvColumns table(folder / "runs.csv");
   if (table.rows() == 0) return {};
   const SweepRuns runs{table, sweep.value("vary", ""), ShownMetrics(table)};
@@ -211,7 +207,8 @@ Json SweepData(const std::filesystem::path& folder, const Json& sweep, ColumnPoo
         const std::string unit = UnitOf(MetricKey::Parse(metric), block_units);
         if (!unit.empty()) units[metric] = unit;
       }
-      groups.push_back(GroupOf(runs, estimator, values[v], entry, pool));
+      const std::string command = run_command + OptionsOf(sweep, values[v].value, estimator);
+      groups.push_back(GroupOf(runs, estimator, values[v], command, entry, pool));
     }
   }
   for (const std::string& metric : runs.metrics) {

@@ -58,7 +58,7 @@ Json BlocksOf(const PageTrajectory& trajectory, ColumnPool& pool) {
 Json LandmarksOf(const PageTrajectory& trajectory, ColumnPool& pool) {
   const std::vector<std::array<double, 3>>& points = trajectory.points;
   Json data = Json::object();
-  data["id"] = pool.AddIntegers(trajectory.point_ids);
+  data["id"] = pool.AddIds(trajectory.point_ids);
   for (std::size_t i = 0; i < kAxes.size(); ++i) {
     data[kAxes[i]] = pool.AddNumbers(ElementOf(points, i));
   }

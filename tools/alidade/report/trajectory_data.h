@@ -20,7 +20,7 @@ struct PageTrajectory {
   std::vector<std::array<double, 4>> orientations;  ///< w x y z; empty: unknown
   std::vector<std::array<double, 3>> errors;        ///< errors of the positions; empty: unknown
   std::vector<std::array<double, 3>> points;        ///< landmarks; empty: none
-  std::vector<std::uint32_t> point_ids;             ///< number of each landmark
+  std::vector<double> point_ids;                    ///< number of each landmark
 };
 
 /// Returns an object like `run` in the data of a page. Its estimators are the trajectories, which

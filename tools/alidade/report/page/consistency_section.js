@@ -33,10 +33,17 @@ function consistencySection(main) {
   neesFigure(box);
   if (!tested.length) return;
   nisFigure(box, tested);
+  const isWhole = (sensor) =>
+    RUN.estimators.every((e) => {
+      const I = innovationsOf(e, sensor);
+      return !I || !isThinned(e, I);
+    });
+  const whole = tested.filter(isWhole);
+  if (!whole.length) return;
   fold(
     box,
     'Whiteness of the innovations',
     'histogram and autocorrelation, sensor by sensor',
-    (parent) => tested.forEach((sensor) => whitenessFigures(parent, sensor)),
+    (parent) => whole.forEach((sensor) => whitenessFigures(parent, sensor)),
   );
 }

@@ -147,6 +147,11 @@ const countOfUses = (e, sensor, uses) =>
   );
 const rejectedCount = (e, sensor) => countOfUses(e, sensor, ['rejected']);
 const usedCount = (e, sensor) => countOfUses(e, sensor, ['accepted', 'initialised']);
+const givenCount = (e, sensor) =>
+  sum(RUN.outcomes.map((outcome) => e.counts[`${outcome.name}:${sensor}`] || 0));
+
+/** True if the page contains a part of the innovations of a sensor: those with the largest NIS. */
+const isThinned = (e, I) => givenCount(e, I.sensor) > columnOf(I.outcome).length;
 
 /** The columns of the landmarks of an estimator. */
 const mapColumns = (e) =>

@@ -19,7 +19,6 @@ const CAUSES = [
     'The estimate left the domain of its models: check the units, the prior and the gate, ' +
       'and see the last innovations below.',
   ],
-  [/hang|timeout/i, 'A plugin needed longer than --frame-timeout.'],
 ];
 
 /** The quoted lines of the file, with a caret below the column of the error. */
@@ -64,8 +63,7 @@ function failureSection(main) {
   }
   const hints = CAUSES.filter(([pattern]) => pattern.test(DATA.reason)).map((cause) => cause[1]);
   if (hints.length) box.append(element('p', {}, element('b', {}, 'Likely: '), hints.join(' ')));
-  const isResumable = SWEEP || (RUN && !COMPARISON && DATA.status === 'stopped');
-  if (isResumable && DATA.command)
+  if (SWEEP && !COMPARISON && DATA.command)
     box.append(commandLine('Continue:', `${DATA.command} -o FOLDER --resume`));
   else if (DATA.command) box.append(commandLine('Repeat:', DATA.command));
   main.append(box);

@@ -4,7 +4,7 @@
 /** Landmarks of each frame, and the rms of their innovations, for each sensor of landmarks. */
 function landmarkCountFigure(box, lanes) {
   const hasFrames = (I) => I.landmark !== undefined && I.dof && framesOf(I).t.length > 1;
-  const maps = lanes.filter(({I}) => hasFrames(I));
+  const maps = lanes.filter(({e, I}) => hasFrames(I) && !isThinned(e, I));
   const sensors = unique(maps.map(({I}) => I.sensor));
   if (!sensors.length) return;
   const changes = changePlots(unique(maps.map(({e}) => e)));
@@ -86,7 +86,7 @@ function changePlots(estimators) {
 }
 
 function countPlot(sensor, users, isFirst) {
-  const most = Math.max(1, ...users.map(({I}) => Math.max(...framesOf(I).used)));
+  const most = Math.max(1, ...users.map(({I}) => maxOf(framesOf(I).used)));
   return new Plot({
     label: `${sensor}: landmarks of a frame`,
     time: true,

@@ -36,7 +36,7 @@ function paintLane(surface, X, plot, lane, y) {
   const {e, I} = lane;
   const {l, r} = plot.f;
   const isMap = I.landmark !== undefined;
-  const top = isMap ? Math.max(1, ...framesOf(I).used, ...framesOf(I).rejected) : 1;
+  const top = isMap ? Math.max(1, maxOf(framesOf(I).used), maxOf(framesOf(I).rejected)) : 1;
   const ticks = ticksOfLane(lane, X, plot, top);
   const alpha = dim(e.name);
   const width = clamp((0.7 * (r - l)) / distinctCount(columnOf(I.t)), 1, 4);

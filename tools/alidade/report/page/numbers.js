@@ -26,6 +26,9 @@ function numberText(v, digits = 3) {
   return s.replace('-', '−');
 }
 
+/** The largest of many numbers, or -Infinity. */
+const maxOf = (values) => values.reduce((a, b) => Math.max(a, b), -Infinity);
+
 const count = (n) => String(n).replace(/\B(?=(\d{3})+$)/g, n >= 1e4 ? '\u202f' : '');
 const plural = (n, one, many) => `${count(n)} ${n === 1 ? one : many || one + 's'}`;
 
@@ -41,9 +44,8 @@ function unitFor(unit, size) {
   if (unit === 'rad/s') return [180 / Math.PI, '°/s'];
   const m = /^(m|s|m\/s)$/.exec(unit || '');
   if (m && size > 0 && Number.isFinite(size)) {
-    if (size < 5e-5) return [1e6, 'µ' + unit];
-    if (size < 0.1) return [1e3, 'm' + unit];
-    if (unit === 'm' && size > 5000) return [1e-3, 'km'];
+    if (size < 1e-3) return [1e6, 'µ' + unit];
+    if (size < 1) return [1e3, 'm' + unit];
   }
   return [1, unit || ''];
 }

@@ -6,14 +6,14 @@ const countOf = (e, name) =>
   sum(Object.entries(e.counts).map(([key, n]) => (key.startsWith(name + ':') ? n : 0)));
 
 const usedColumn = () => {
-  const totalOf = (e) =>
-    countOf(e, 'accepted') + sum(e.sensors.map((sensor) => rejectedCount(e, sensor)));
+  const usedOf = (e) => sum(e.sensors.map((sensor) => usedCount(e, sensor)));
+  const totalOf = (e) => sum(e.sensors.map((sensor) => givenCount(e, sensor)));
   return {
     name: 'used / given',
     sub: 'measurements',
-    get: (e) => countOf(e, 'accepted'),
+    get: usedOf,
     show: (e) => {
-      const used = countOf(e, 'accepted');
+      const used = usedOf(e);
       const total = totalOf(e);
       const cls = used < 0.9 * total ? 'warn' : '';
       return element('span', {class: cls}, `${count(used)} / ${count(total)}`);

@@ -3,7 +3,7 @@
 
 /** What a dot of a run shows. */
 const runTip = (group, metric) => (i) => {
-  const seed = columnOf(group.seed)[i];
+  const seed = group.seeds[i];
   return [
     element('b', {}, `seed ${seed}`),
     nameOf(group.estimator),
@@ -48,7 +48,7 @@ function seedFigure(groups, metric) {
 const seedDots = (group, metric, row) => ({
   kind: 'dots',
   x: valuesOf(group, metric),
-  y: Array.from(columnOf(group.seed), (seed) => row + jitterOf(seed)),
+  y: group.seeds.map((seed) => row + jitterOf(seed)),
   est: group.estimator,
   name: group.estimator,
   size: 2.8,
@@ -74,7 +74,7 @@ const markPainter =
   (surface, X, Y) => {
     for (const group of visibleGroups(groups)) {
       const values = valuesOf(group, metric);
-      const seeds = columnOf(group.seed);
+      const {seeds} = group;
       const worst = worstRuns(group, metric).flatMap((i) => [
         X.to(values[i]),
         Y.to(rowOf(group) + jitterOf(seeds[i])),

@@ -64,7 +64,7 @@ function estimatorItem(group, add) {
 const findingTexts = (e) => (e.diagnosis || []).map((finding) => sentence(finding.text) + ' ');
 
 /** Kinds of events whose content a verdict reports. */
-const VERDICT_KINDS = /^(diverged|lost|mostly_rejected|nees_bounds|nis_bounds)$/;
+const VERDICT_KINDS = /^(diverged|lost|mostly_rejected)$/;
 
 /** One text for each kind of event: the first event, and the number of the others. */
 function eventTexts(e) {

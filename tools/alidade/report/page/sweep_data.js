@@ -40,9 +40,7 @@ const variedValues = () => {
 };
 
 /** The command that repeats the run of a seed in a group. */
-function seedCommand(group, seed) {
-  return `alidade run ${DATA.config_file || 'CONFIG'} --seed ${seed}${group.options}`;
-}
+const seedCommand = (group, seed) => `${group.command} --seed ${seed}`;
 
 /** The indices of the five worst runs of a group, the worst first. */
 function worstRuns(group, metric) {

@@ -4,7 +4,7 @@
 function worstRunTable(groups, metric) {
   const rows = groups.flatMap((group) =>
     worstRuns(group, metric).map((i, k) => {
-      const seed = columnOf(group.seed)[i];
+      const seed = group.seeds[i];
       return {group, seed, rank: k + 1, value: valuesOf(group, metric)[i]};
     }),
   );
@@ -21,13 +21,13 @@ function worstRunTable(groups, metric) {
       show: (r) => nameOf(r.group.estimator),
     },
     {name: 'rank', get: (r) => r.rank, show: (r) => String(r.rank)},
-    {name: 'seed', get: (r) => r.seed, show: (r) => String(r.seed)},
+    {name: 'seed', get: (r) => Number(r.seed), show: (r) => r.seed},
     {
       name: metricName(metric),
       get: (r) => r.value,
       show: (r) => withUnit(r.value, metricUnit(metric)),
     },
-    {name: 'command', text: true, get: (r) => r.seed, show: commandCell},
+    {name: 'command', text: true, get: (r) => Number(r.seed), show: commandCell},
   ];
   return element(
     'figure',

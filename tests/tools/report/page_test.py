@@ -617,7 +617,7 @@ class Use(PageCase):
         for name in ("ekf", "fused_2017", "stereo_only", "scale_only", "scale_lambda_known"):
             self.assertIn(name, texts)
         self.assertGreaterEqual(len(colours), 5)
-        self.assertIn("depth [m]", texts)
+        self.assertIn("depth [mm]", texts)
 
     def test_a_saved_png_is_a_picture(self):
         self.open_depth()
@@ -831,7 +831,7 @@ class Explanations(PageCase):
         self.assertIn("sensors.stereo.focal_px", keys)
 
     def test_explanations_of_other_models(self):
-        for example in ("10_slam_scene", "13_slam_odometry_tracks"):
+        for example in ("10_slam_scene", "22_range_bearing"):
             self.open_explanation(example, example + "/config.yaml")
 
     def test_hostile_texts_are_explained(self):

@@ -60,8 +60,11 @@ function cloud(points) {
   return eigen3(A);
 }
 
-/** Roll, pitch and yaw [rad] of columns w, x, y, z; continuous over time. */
-function rollPitchYaw(q) {
+/**
+ * Roll, pitch and yaw [rad] of columns w, x, y, z: continuous over time, or, if `near` is given,
+ * within half a turn of these angles.
+ */
+function rollPitchYaw(q, near) {
   const [w, x, y, z] = q;
   const n = w.length;
   const out = [0, 1, 2].map(() => new Float32Array(n));
@@ -71,10 +74,10 @@ function rollPitchYaw(q) {
       Math.asin(clamp(2 * (w[i] * y[i] - z[i] * x[i]), -1, 1)),
       Math.atan2(2 * (w[i] * z[i] + x[i] * y[i]), 1 - 2 * (y[i] * y[i] + z[i] * z[i])),
     ];
-    for (let k = 0; k < 3; k++)
-      out[k][i] = i
-        ? e[k] - 2 * Math.PI * Math.round((e[k] - out[k][i - 1]) / (2 * Math.PI) || 0)
-        : e[k];
+    for (let k = 0; k < 3; k++) {
+      const anchor = near && Number.isFinite(near[k][i]) ? near[k][i] : i ? out[k][i - 1] : e[k];
+      out[k][i] = e[k] - 2 * Math.PI * Math.round((e[k] - anchor) / (2 * Math.PI) || 0);
+    }
   }
   return out;
 }

@@ -27,7 +27,10 @@ function legendKey(name, i) {
       class: 'key',
       'aria-pressed': 'true',
       title: verdict ? `${verdict.state}: ${verdict.because}\n${help}` : help,
-      onclick: (event) => toggle(name, event.altKey),
+      onclick: (event) => {
+        page.focus = null;
+        toggle(name, event.altKey);
+      },
       ondblclick: () => setHidden(NAMES.filter((other) => other !== name)),
       onmouseenter: focus(name),
       onmouseleave: focus(null),

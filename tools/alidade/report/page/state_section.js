@@ -31,8 +31,8 @@ function computeElements(block) {
     };
     return {values: value.map(valueOf), errors};
   }
-  const angles = rollPitchYaw(value);
   const trueAngles = truth[0] ? rollPitchYaw(truth) : [];
+  const angles = rollPitchYaw(value, truth[0] && trueAngles);
   const angleOf = (label, k) => ({label, unit: 'rad', y: angles[k], truth: trueAngles[k]});
   return {values: ['roll', 'pitch', 'yaw'].map(angleOf), errors};
 }

@@ -53,7 +53,11 @@ class CanvasSurface {
     const c = this.c;
     this.style({...o, width: o.width || 1.5});
     if (shape === 'square') {
-      for (let i = 0; i < pts.length; i += 2) c.fillRect(pts[i] - r, pts[i + 1] - r, 2 * r, 2 * r);
+      for (let i = 0; i < pts.length; i += 2) {
+        const corner = [pts[i] - r, pts[i + 1] - r, 2 * r, 2 * r];
+        c.fillRect(...corner);
+        if (o.stroke) c.strokeRect(...corner);
+      }
       return;
     }
     c.beginPath();

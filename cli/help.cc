@@ -61,7 +61,8 @@ std::string HelpFormat::make_help(const CLI::App* app, std::string name,
   for (const char* const group : kGroups) {
     const std::vector<const CLI::Option*> options =
         app->get_options([group](const CLI::Option* option) {
-          return option->nonpositional() && GroupOfOption(*option) == group;
+          return option->nonpositional() && !option->get_group().empty() &&
+                 GroupOfOption(*option) == group;
         });
     if (!options.empty()) text += make_group(group, false, options);
   }

@@ -77,7 +77,8 @@ ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
   if (!quiet) {
     const std::filesystem::path written = result.stopped ? internal::PartialOf(path) : path;
     PrintText(SweepTable(result, summaries, OutputWidth()) +
-              WorstSeedText(result, written, inputs) + ReportLine(written));
+              WorstSeedText(result, written, inputs) +
+              "all metrics: " + (written / "table.md").string() + '\n' + ReportLine(written));
   }
   return CodeOf(result.stopped, failed);
 }

@@ -331,8 +331,12 @@ std::vector<std::string> ShownMetrics(const RunResult& result) {
 }
 
 std::vector<TableRow> MetricRows(const RunResult& result) {
+  return MetricRows(result, ShownMetrics(result));
+}
+
+std::vector<TableRow> MetricRows(const RunResult& result, const std::vector<std::string>& keys) {
   std::vector<TableRow> rows;
-  for (const std::string& text : ShownMetrics(result)) {
+  for (const std::string& text : keys) {
     rows.push_back(RowOf(result, text, ShownName(MetricKey::Parse(text).name)));
   }
   return rows;

@@ -19,6 +19,8 @@ std::vector<std::string> OrderedCounts(const RunResult& result);
 std::vector<std::string> ShownMetrics(const RunResult& result);
 /// Returns the rows of ShownMetrics().
 std::vector<TableRow> MetricRows(const RunResult& result);
+/// Returns the rows of these metrics.
+std::vector<TableRow> MetricRows(const RunResult& result, const std::vector<std::string>& keys);
 /// Returns the row `verdict`, MetricRows() and the rows of all counts. If the verdict on an
 /// estimator is bad, ` !` marks each mean NEES and NIS outside its bounds.
 std::vector<TableRow> ComparisonRows(const RunResult& result);

@@ -81,8 +81,9 @@ def panels(
         raise AlidadeError("nothing to draw: no element, sensor or metric matches the options")
     wide = side_by_side if columns == 2 and len(titles) > 5 else 1
     rows = math.ceil(len(titles) / wide)
+    lowest_in = min(height_in, LOWEST_IN)
     height_in = min(height_in, PAGE_IN / rows)
-    if height_in < LOWEST_IN:
+    if height_in < lowest_in:
         raise AlidadeError(
             f"{len(titles)} panels do not fit on a page; "
             "choose some with --blocks or --metrics, or use --columns 2"

@@ -169,8 +169,8 @@ TEST(SweepTable, HasCountsOfVerdictsAndLabelledStatistics) {
       "consistent    2\n"
       "\n"
       "Mean over the used runs, 95 % interval of this mean, and quantiles over the used runs:\n"
-      "        estimator  mean  95 % interval   5 %  median  95 %\n"
-      "rmse x        ekf  3.00  [-3.57, 9.57]  1.10    2.00  5.60\n");
+      "        mean  95 % interval   5 %  median  95 %\n"
+      "rmse x  3.00  [-3.57, 9.57]  1.10    2.00  5.60\n");
 }
 
 TEST(SweepTable, ReportsAMeanNeesThatFailsOverTheRuns) {

@@ -88,10 +88,12 @@ std::optional<Conclusion> LeastError(const std::vector<const EstimatorResult*>& 
   const double gain = 1.0 - best.metrics.at(key) / second.metrics.at(key);
   const std::string difference =
       gain < kSame ? "as accurate as " : PercentText(gain) + " less than ";
-  return Conclusion{Tone::kNeutral,
-                    "Least rmse of " + MetricKey::Parse(key).subject + ": " + best.name + ", " +
-                        ValueText(best, key) + ", " + difference + second.name + '.',
-                    "one seed; `alidade sweep --runs 100` shows whether the difference is chance"};
+  return Conclusion{
+      Tone::kNeutral,
+      "Least rmse of " + MetricKey::Parse(key).subject + ": " + best.name + ", " +
+          ValueText(best, key) + ", " + difference + second.name + '.',
+      "one run; with simulated data, `alidade sweep --runs 100` shows whether the difference is "
+      "chance"};
 }
 
 /// Returns a sentence about the errors of the best estimator in each segment of the config.

@@ -47,6 +47,7 @@ Json DecompositionOf(const Json& decomposition) {
     steps.push_back({{"kind", step.at("kind")},
                      {"from", step.value("from", Json())},
                      {"to", step.value("to", Json())},
+                     {"at_end", step.value("at_end", false)},
                      {"values", IntervalsOf(step.at("values"))}});
   }
   return {{"filter", decomposition.value("filter", Json())}, {"steps", steps}};

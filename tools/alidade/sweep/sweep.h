@@ -184,8 +184,8 @@ struct SweepSummary {
 /// Summarises each estimator over all runs.
 std::vector<SweepSummary> Summarise(const SweepResult& result);
 
-/// Formats the counts of verdicts and the statistics of the main metrics for a terminal of this
-/// width. `summaries` is the result of Summarise(result).
+/// Formats the counts of verdicts and the statistics of the most relevant metrics for a terminal of
+/// this width. table.md contains all metrics. `summaries` is the result of Summarise(result).
 std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary>& summaries,
                        std::size_t width = internal::kDefaultTextWidth);
 /// Formats the means of the main metrics in a table for each estimator, with a row for each value.

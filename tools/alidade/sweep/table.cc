@@ -31,10 +31,13 @@ std::string ReferenceText(const SweepResult& result) {
 constexpr const char* kMetricsTitle =
     "Mean over the used runs, 95 % interval of this mean, and quantiles over the used runs";
 
+/// Metrics in a table: the most relevant ones for a terminal, or all.
+enum class Rows { kMain, kAll };
+
 /// Returns the table of the metrics, with a row for each metric of each estimator. The statistics
 /// of all estimators are formatted as columns of one table, so all numbers of a metric have the
 /// same unit.
-Table MetricTable(const std::vector<SweepSummary>& summaries) {
+Table MetricTable(const std::vector<SweepSummary>& summaries, Rows rows) {
   constexpr std::size_t kStatistics = 6;
   RunResult columns;
   for (const SweepSummary& summary : summaries) {
@@ -51,15 +54,25 @@ Table MetricTable(const std::vector<SweepSummary>& summaries) {
       }
     }
   }
-  Table table{{"", "estimator", "mean", "95 % interval", "5 %", "median", "95 %"}, {}, 2};
-  for (const TableRow& source : MetricRows(columns)) {
+  const bool has_names = summaries.size() > 1;
+  Table table{{"", "mean", "95 % interval", "5 %", "median", "95 %"}, {}, has_names ? 2U : 1U};
+  if (has_names) table.header.insert(table.header.begin() + 1, "estimator");
+  const std::vector<std::string> keys =
+      rows == Rows::kMain ? MainKeys(columns, {}) : ShownMetrics(columns);
+  for (const TableRow& source : MetricRows(columns, keys)) {
     std::string label = source.label;  // only in the first row of the metric
     for (std::size_t e = 0; e < summaries.size(); ++e) {
       const std::string* const c = &source.cells[e * kStatistics];
       if (c[0] == "-") continue;
       const bool has_interval = c[1] != "-";
-      table.rows.push_back({std::exchange(label, ""), summaries[e].name, c[0],
-                            has_interval ? '[' + c[1] + ", " + c[2] + ']' : "-", c[3], c[4], c[5]});
+      std::vector<std::string>& row = table.rows.emplace_back();
+      row = {std::exchange(label, ""),
+             c[0],
+             has_interval ? '[' + c[1] + ", " + c[2] + ']' : "-",
+             c[3],
+             c[4],
+             c[5]};
+      if (has_names) row.insert(row.begin() + 1, summaries[e].name);
     }
   }
   return table;
@@ -71,7 +84,10 @@ std::string FormatTables(const SweepResult& result, const std::vector<SweepSumma
   const char* const title_end = format == TableFormat::kMarkdown ? ":\n\n" : ":\n";
   return FormatConclusions(ConclusionsOf(result, summaries), format) +
          FormatTable(MakeTable(NamesOf(summaries), VerdictRows(summaries)), format, width) + '\n' +
-         kMetricsTitle + title_end + FormatTable(MetricTable(summaries), format, width) +
+         kMetricsTitle + title_end +
+         FormatTable(
+             MetricTable(summaries, format == TableFormat::kText ? Rows::kMain : Rows::kAll),
+             format, width) +
          ReferenceLines(result);
 }
 

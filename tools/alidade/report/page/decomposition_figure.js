@@ -4,10 +4,13 @@
 const COST_COLOUR = '#E08A00';
 const GAIN_COLOUR = '#56B4E9';
 
-/** Bars {name, from, to, isTotal} of the decomposition of the error of a block. */
+/**
+ * Bars {name, from, to, isTotal} of the decomposition of the error of a block. Steps that are known
+ * only at the last frame are omitted.
+ */
 function decompositionBars(block) {
   const {filter, steps} = COMPARISON.decomposition;
-  const step = (kind) => steps.find((s) => s.kind === kind);
+  const step = (kind) => steps.find((s) => s.kind === kind && !s.at_end);
   const error = (s, key) => (s && s.values[key + block] ? s.values[key + block][0] : undefined);
   const linearisation = step('linearisation');
   const smoothing = step('smoothing');

@@ -13,7 +13,8 @@ const CAUSES = [
     /timestamp|older|order/i,
     'Times that decrease, or times in another unit: see out_of_sequence in the config.',
   ],
-  [/not_finite|\bnan\b|\binf/i, 'A value was not finite: see the last innovations below.'],
+  [/not_finite|\bnan\b|\binf/i, 'A value was not finite: see the last innovations below, or list the text of such cells ' +
+      'in source.missing.'],
   [
     /diverg/i,
     'The estimate left the domain of its models: check the units, the prior and the gate, ' +

@@ -26,7 +26,7 @@ constexpr const char* kSweepFooter = R"(Examples:
   alidade sweep config.yaml --runs 200 -o runs/test --resume
 
 The folder contains sweep.json, runs.csv and table.md. With --vary or --vary-filter, it also
-contains sweep.csv and a figure. The number of jobs does not change the contents. Exit code 1: some
+contains sweep.csv. The number of jobs does not change the contents. Exit code 1: some
 runs failed; 75: a signal stopped the sweep. Until all runs are finished, the folder is called
 FOLDER.partial. A sweep that was stopped or killed leaves this folder, and --resume adds the missing
 runs. `alidade merge` merges the folders of shards.)";

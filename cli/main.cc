@@ -128,7 +128,9 @@ ExitCode UsageError(const CLI::App& command, const std::string& message) {
 
 ExitCode Fail(const CLI::App& program, const CLI::ParseError& error) {
   const CLI::App& command = InnermostCommand(program);
-  if (dynamic_cast<const CLI::CallForHelp*>(&error) != nullptr) {
+  const bool has_unknown_command =
+      program.get_subcommands().empty() && program.remaining_size() > 0;
+  if (dynamic_cast<const CLI::CallForHelp*>(&error) != nullptr && !has_unknown_command) {
     PrintText(program.help());
     return ExitCode::kOk;
   }

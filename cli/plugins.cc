@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "alidade/check/plugin_listing.h"
+#include "alidade/io/wrap_text.h"
 #include "command.h"
 #include "console.h"
 
@@ -39,7 +40,7 @@ std::shared_ptr<PluginsArguments> AddListing(CLI::App& command, Action& action, 
     action = [arguments, listing, on_refusal] {
       const PluginHost host(Absolute(arguments->paths), on_refusal);
       const std::string text = listing(host, *arguments);
-      arguments->json ? Print(text) : PrintText(text);
+      Print(arguments->json ? text : internal::WrapText(text, OutputWidth()));
       return ExitCode::kOk;
     };
   });

@@ -6,6 +6,7 @@
 
 #include "alidade/base/text.h"
 #include "alidade/config/config.h"
+#include "alidade/io/near_file.h"
 #include "alidade/io/read_file.h"
 #include "alidade/io/run_files.h"
 #include "alidade/report/bundle_data.h"
@@ -175,6 +176,12 @@ Json DataOf(const Folder& folder, internal::ColumnPool& pool) try {
 }  // namespace
 
 std::string ReportPage(const fs::path& path) {
+  if (!fs::exists(path)) {
+    throw Error(ExitCode::kInputMissing,
+                ErrorLine(Place{path.string()}, {}, "the folder does not exist",
+                          "a folder that `alidade run`, `compare`, `sweep` or `bundle` has written",
+                          internal::NearFile(path)));
+  }
   const Folder folder(path);
   if (folder.main().is_null()) {
     throw Error(

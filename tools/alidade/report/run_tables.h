@@ -27,7 +27,8 @@ struct RunRows {
 /// rejected ones.
 struct EstimatorTables {
   /// The rows of `estimates` and `errors` have the same timestamps, also while the run writes these
-  /// files, and if it was killed. Gains and covariances of the poses of a run that is not finished are omitted.
+  /// files, and if it was killed. Gains and covariances of the poses of a run that is not finished
+  /// are omitted.
   EstimatorTables(const std::filesystem::path& folder, const std::string& estimator,
                   const Json& run_entry, const RunRows& rows);
 

@@ -87,10 +87,12 @@ TEST(RunConclusions, RankTheErrorsAndNameThoseOfSegments) {
   const RunResult result =
       RunOf({ResultOf("ekf", {{"rmse:cam.position", 0.020}}),
              ResultOf("iekf", {{"rmse:cam.position", 0.015}, {"rmse:cam.position@blind", 0.018}})});
-  EXPECT_EQ(ConclusionLines(ConclusionsOf(result, {})),
-            (Lines{"Least rmse of cam.position: iekf, 15 mm, 25 % less than ekf. (one run; with simulated data, "
-                   "`alidade sweep --runs 100` shows whether the difference is chance)",
-                   "iekf: rmse of cam.position 18 mm in segment blind."}));
+  EXPECT_EQ(
+      ConclusionLines(ConclusionsOf(result, {})),
+      (Lines{"Least rmse of cam.position: iekf, 15 mm, 25 % less than ekf. (one run; "
+             "with simulated data, `alidade sweep --runs 100` shows whether the difference is "
+             "chance)",
+             "iekf: rmse of cam.position 18 mm in segment blind."}));
 }
 
 TEST(RunConclusions, CompareTheFinalErrorWithThePath) {

@@ -7,7 +7,8 @@
 #include "alidade/compare/compare.h"
 #include "alidade/io/csv_file.h"
 
-/// Csv files of a comparison over several seeds. The page and the Python package read over_time.csv.
+/// Csv files of a comparison over several seeds. The page and the Python package read
+/// over_time.csv.
 namespace alidade {
 namespace {
 

@@ -70,7 +70,7 @@ std::string HelpFormat::make_help(const CLI::App* app, std::string name,
 }
 
 std::string HelpFormat::make_option_opts(const CLI::Option* option) const {
-  const std::string text = option->get_option_text();
+  const std::string& text = option->get_option_text();
   return text.empty() || text == " " ? "" : ' ' + text;
 }
 

@@ -32,7 +32,7 @@ namespace http = boost::beast::http;
 using boost::system::error_code;
 using std::chrono::duration;
 using std::chrono::steady_clock;
-using tcp = asio::ip::tcp;
+using Tcp = asio::ip::tcp;
 
 constexpr std::chrono::milliseconds kMinInterval{100};
 constexpr double kMaxShare = 0.01;  // of the time of one core
@@ -89,7 +89,7 @@ struct Hub {
 /// Connection of a browser: one request, then its response or a stream of events.
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
-  Connection(tcp::socket socket, Hub& hub) : stream_(std::move(socket)), hub_(hub) {
+  Connection(Tcp::socket socket, Hub& hub) : stream_(std::move(socket)), hub_(hub) {
     parser_.body_limit(0);
   }
 
@@ -122,7 +122,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   }
   void Close() {
     error_code ignored;
-    stream_.socket().shutdown(tcp::socket::shutdown_both, ignored);
+    stream_.socket().shutdown(Tcp::socket::shutdown_both, ignored);
     stream_.socket().close(ignored);
     hub_.Remove(shared_from_this());
   }
@@ -224,7 +224,7 @@ struct LiveServer::Impl {
   void CloseAll();
 
   asio::io_context context{1};
-  tcp::acceptor acceptor{context};
+  Tcp::acceptor acceptor{context};
   asio::steady_timer timer{context}, retry{context};
   std::uint16_t opened_port = 0;
   live::Hub hub;
@@ -235,10 +235,10 @@ struct LiveServer::Impl {
 };
 
 LiveServer::Impl::Impl(std::uint16_t port, Content content) : hub{std::move(content)} {
-  const tcp::endpoint endpoint(asio::ip::address_v4::loopback(), port);
+  const Tcp::endpoint endpoint(asio::ip::address_v4::loopback(), port);
   error_code error;
   acceptor.open(endpoint.protocol(), error);
-  if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+  if (!error) acceptor.set_option(Tcp::acceptor::reuse_address(true), error);
   if (!error) acceptor.bind(endpoint, error);
   if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
   if (!error) opened_port = acceptor.local_endpoint(error).port();
@@ -250,7 +250,7 @@ LiveServer::Impl::Impl(std::uint16_t port, Content content) : hub{std::move(cont
 }
 
 void LiveServer::Impl::Accept() {
-  acceptor.async_accept([this](error_code error, tcp::socket socket) {
+  acceptor.async_accept([this](error_code error, Tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
     if (!error && hub.connections.size() < kMaxConnections) {
       const auto connection = std::make_shared<live::Connection>(std::move(socket), hub);

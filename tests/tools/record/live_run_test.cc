@@ -31,6 +31,13 @@ RunResult RunWith(Experiment& experiment, std::vector<RunObserver*> observers) {
   return Run(experiment, options);
 }
 
+/// Options of a recorder that writes each row at once.
+Recorder::Options WithoutDelay(const std::filesystem::path& folder) {
+  Recorder::Options options = testing::OptionsFor(folder);
+  options.max_delay = std::chrono::milliseconds(0);
+  return options;
+}
+
 std::uint16_t PortOf(const LiveRun& live) {
   const std::string address = live.address();
   const std::size_t colon = address.rfind(':');
@@ -58,9 +65,7 @@ TEST(LiveRun, SendsTheRowsSoFarAndThenTheReport) {
   const testing::TemporaryFolder temporary;
   const auto folder = temporary / "run";
   LiveRun live(0, folder, testing::MakeConfig());
-  Recorder::Options record = testing::OptionsFor(folder);
-  record.max_delay = std::chrono::milliseconds(0);
-  Recorder recorder(record, testing::MakeConfig());
+  Recorder recorder(WithoutDelay(folder), testing::MakeConfig());
   std::unique_ptr<HttpClient> client;
   std::string page, update;
   ActionAt look(30, [&] {
@@ -101,9 +106,7 @@ TEST(LiveRun, ShowsTheLastRowsOfALongRun) {
   const testing::TemporaryFolder temporary;
   const auto folder = temporary / "run";
   LiveRun live(0, folder, testing::MakeConfig());
-  Recorder::Options record = testing::OptionsFor(folder);
-  record.max_delay = std::chrono::milliseconds(0);
-  Recorder recorder(record, testing::MakeConfig());
+  Recorder recorder(WithoutDelay(folder), testing::MakeConfig());
   std::string update;
   ActionAt look(2500, [&] {
     HttpClient client(PortOf(live));

@@ -18,8 +18,8 @@ namespace alidade::internal {
 /// counted.
 class LiveServer {
  public:
-  /// Texts that the server sends. Both are called on its thread. If a function throws an Error, the
-  /// server answers that the page is not ready, or omits the update.
+  /// Texts that the server sends. Both functions are called on its thread. If one throws an
+  /// exception, the server answers that the page is not ready, or omits the update.
   struct Content {
     std::function<std::string()> page;    ///< returns HTML
     std::function<std::string()> update;  ///< returns data without line ends; "": no update
@@ -34,7 +34,7 @@ class LiveServer {
 
   void Start();
   /// Sends a last event `end` with `data` to all browsers, and stops the server. Waits at most two
-  /// seconds for slow browsers. An empty `data` means that there is no further data.
+  /// seconds for slow browsers.
   void Finish(const std::string& data);
 
   std::uint16_t port() const;

@@ -14,6 +14,8 @@
 #include "alidade/estimation/time_offset.h"
 #include "alidade/experiment/defect_node.h"
 #include "alidade/experiment/read_landmarks.h"
+#include "alidade/formula/formula_motion.h"
+#include "alidade/formula/formula_sensor.h"
 #include "alidade/state/element_names.h"
 #include "alidade/state/quaternion_sign.h"
 
@@ -21,6 +23,9 @@ namespace alidade {
 namespace {
 
 using internal::NamesOf;
+
+/// Model whose equations are expressions in its config entry. It is part of the program.
+constexpr const char* kFormula = "formula";
 
 /// Calls `add`. If `add` throws, throws the error again with the place of the entry.
 template <class Add>
@@ -184,9 +189,13 @@ InputBinding ReadInput(const Node& entry, const MotionModel& model) {
 
 void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost& host,
                     Problem& problem) {
-  const SharedMotion model = host.CreateMotion(entry.At("model", "a state entry").Text(), entry);
+  const std::string model_name = entry.At("model", "a state entry").Text();
+  const bool is_formula = model_name == kFormula;
+  const SharedMotion model =
+      is_formula ? internal::CreateFormulaMotion(entry) : host.CreateMotion(model_name, entry);
   const InputBinding input = ReadInput(entry, *model);
-  const std::vector<std::string> names = ReadBlockNames(entry, *model);
+  const std::vector<std::string> names =
+      is_formula ? NamesOf(model->blocks()) : ReadBlockNames(entry, *model);
   const auto considered = ReadNames(entry, "consider", names);
   const auto constant = ReadNames(entry, "constant", names);
   for (const std::string& block : constant) {
@@ -388,12 +397,14 @@ std::string BlocksFor(const Space& role, const Problem& problem) {
   return (names.size() > 1 ? "one of " : "") + internal::Join(names);
 }
 
-BlockId FindBlock(const Node& node, const Space& role, const Problem& problem) {
+/// Returns the block that `node` names. `expected` lists the accepted blocks in messages.
+BlockId FindBlock(const Node& node, const Problem& problem, std::string expected = {}) {
   const std::string name = node.Text();
   const BlockId id = problem.layout.Find(name);
   if (id >= 0) return id;
-  node.Fail("block '" + name + "' does not exist", BlocksFor(role, problem),
-            Nearest(name, NamesOf(problem.layout.blocks())));
+  const std::vector<std::string> names = NamesOf(problem.layout.blocks());
+  if (expected.empty()) expected = internal::Join(names);
+  node.Fail("block '" + name + "' does not exist", expected, Nearest(name, names));
 }
 
 /// Rejects a block whose geometry or unit differs from that of the role. A unit that the model does
@@ -413,9 +424,9 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
                      const Problem& problem) {
   RoleBinding binding;
   if (!node.is_map()) {
-    binding.block = FindBlock(node, role, problem);
+    binding.block = FindBlock(node, problem, BlocksFor(role, problem));
   } else {
-    binding.block = FindBlock(node.At("block", "a role"), role, problem);
+    binding.block = FindBlock(node.At("block", "a role"), problem, BlocksFor(role, problem));
     if (const auto mode = node.Find("mode")) {
       binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "known"}));
     }
@@ -448,14 +459,33 @@ RobustLoss ReadLoss(const Node& node) {
   return *loss;
 }
 
+/// Creates a sensor from the expressions in its entry. Its roles have the geometries, units and
+/// elements of the blocks to which they are bound.
+SharedSensor CreateFormula(const Node& entry, const Node& roles, const Problem& problem) {
+  std::vector<Space> bound_roles;
+  bool has_landmark = false;
+  for (const auto& [name, node] : roles.Entries()) {
+    if (name == "landmark") {
+      has_landmark = true;
+      continue;
+    }
+    const Node block = node.is_map() ? node.At("block", "a role") : node;
+    bound_roles.push_back(problem.layout[FindBlock(block, problem)].space);
+    bound_roles.back().name = name;
+    bound_roles.back().flags = 0;
+  }
+  return internal::CreateFormulaSensor(entry, bound_roles, has_landmark);
+}
+
 void ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
                 Problem& problem) {
   const std::string model_name = entry.At("model", "a sensor entry").Text();
   SensorOptions options{.stream = entry.At("stream", "sensor '" + name + "'").Text()};
-  const SharedSensor model = host.CreateSensor(model_name, entry);
-  if (const auto loss = entry.Find("loss")) options.loss = ReadLoss(*loss);
   const Node roles = entry.At("roles", "sensor '" + name + "'", "roles: {ROLE: ENTRY.BLOCK}");
   roles.ExpectMap("{ROLE: ENTRY.BLOCK}");
+  const SharedSensor model = model_name == kFormula ? CreateFormula(entry, roles, problem)
+                                                    : host.CreateSensor(model_name, entry);
+  if (const auto loss = entry.Find("loss")) options.loss = ReadLoss(*loss);
   for (const Space& role : model->roles()) roles.Declare(role.landmark() ? "landmark" : role.name);
   roles.RejectUnread();
   OwnedStateReader owned_states(name, entry, roles, *model);

@@ -52,18 +52,25 @@ std::optional<Node> FindNoiseCovariance(const Node& entry, std::uint32_t kind) {
   return noise && noise->is_map() ? noise->Find("covariance") : std::nullopt;
 }
 
-std::vector<double> ReadNoiseRoot(const Node& covariance, const ModelInstance& model) {
-  const bool is_sensor = model.c().kind == ALIDADE_KIND_SENSOR;
-  if (!is_sensor) ExpectDiscrete(covariance, model);
-  const int n = is_sensor ? model.space().geometry.tangent : model.c().description->noise_count;
+std::vector<double> ReadSqrtR(const Node& covariance, int size) {
   bool is_singular = false;
   std::vector<double> root =
-      RootOf(ReadCovariance(covariance, n), static_cast<std::size_t>(n), is_singular);
-  if (is_sensor && is_singular) {
+      RootOf(ReadCovariance(covariance, size), static_cast<std::size_t>(size), is_singular);
+  if (is_singular) {
     covariance.Fail("is singular, so the measurement would have no noise in one direction",
                     "a positive definite covariance");
   }
   return root;
+}
+
+std::vector<double> ReadNoiseRoot(const Node& covariance, const ModelInstance& model) {
+  if (model.c().kind == ALIDADE_KIND_SENSOR) {
+    return ReadSqrtR(covariance, model.space().geometry.tangent);
+  }
+  ExpectDiscrete(covariance, model);
+  const int n = model.c().description->noise_count;
+  bool is_singular = false;
+  return RootOf(ReadCovariance(covariance, n), static_cast<std::size_t>(n), is_singular);
 }
 
 }  // namespace alidade::internal

@@ -95,6 +95,15 @@ void AddConfigNoise(const std::string& name, const std::vector<double>& root, in
                         SigmasText(l * l.transpose()));
 }
 
+/// Adds the equations of a model that is not from a plugin: those of its config entry.
+void AddEquations(const std::string& name, const std::string& origin,
+                  const std::vector<Space>& spaces, ExplainedTable& table) {
+  if (!origin.empty()) return;
+  for (const Space& space : spaces) {
+    if (!space.doc.empty()) table.notes.push_back(name + ": " + space.doc);
+  }
+}
+
 ExplainedTable MotionTable(const Problem& problem, double step_s) {
   const bool has_input = std::ranges::any_of(
       problem.motions, [](const MotionBinding& motion) { return motion.model->has_input(); });
@@ -112,7 +121,9 @@ ExplainedTable MotionTable(const Problem& problem, double step_s) {
     rows.push_back({motion.name, motion.model->name(), blocks.empty() ? "none" : Join(blocks),
                     noise == 0 ? "none" : std::to_string(noise) + kind});
     if (has_input) rows.back().push_back(InputText(motion));
-    AddConfigNoise(motion.name, motion.model->description().sqrt_noise, noise, table);
+    const MotionModel::Description& description = motion.model->description();
+    AddEquations(motion.name, description.origin, description.blocks, table);
+    AddConfigNoise(motion.name, description.sqrt_noise, noise, table);
     const std::string sigmas = Join(ProcessNoise(problem, motion, step_s));
     if (sigmas.empty()) continue;
     table.notes.push_back("Q of " + motion.name + " for a step of " + RoundedText(step_s, 4) +
@@ -140,8 +151,10 @@ ExplainedTable SensorTable(const Problem& problem) {
   for (const SensorBinding& sensor : problem.sensors) {
     TextRow sensor_columns = {sensor.name, sensor.stream, sensor.model->name(),
                               MeasurementNoise(problem, sensor)};
-    AddConfigNoise(sensor.name, sensor.model->description().sqrt_noise,
-                   sensor.model->measurement().geometry.tangent, table);
+    const SensorModel::Description& description = sensor.model->description();
+    AddEquations(sensor.name, description.origin, {description.measurement}, table);
+    AddConfigNoise(sensor.name, description.sqrt_noise, description.measurement.geometry.tangent,
+                   table);
     for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
       const RoleBinding& role = sensor.roles[i];
       TextRow row = std::exchange(sensor_columns, TextRow(sensor_columns.size()));

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/formula/formula_keys.h"
+
+#include <algorithm>
+
+#include "alidade/base/text.h"
+#include "alidade/state/element_names.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr const char* kNumber = "number";
+
+/// Returns the names of the geometries of fixed size, and `number`.
+std::vector<std::string> GeometryNames() {
+  std::vector<std::string> names = {kNumber};
+  for (const GeometryRow* row : detail::kGeometryRows) {
+    if (row->ambient > 0) names.emplace_back(row->name);
+  }
+  return names;
+}
+
+std::vector<std::pair<std::string, Node>> EntriesOf(const Node& entry, const char* key,
+                                                    const char* example) {
+  const auto map = entry.Find(key);
+  if (!map) return {};
+  map->ExpectMap(example);
+  return map->Entries();
+}
+
+}  // namespace
+
+FormulaKeys::FormulaKeys(const Node& entry)
+    : entry_(entry),
+      units_(entry.Find("units")),
+      definitions_(EntriesOf(entry, "let", "{NAME: EXPRESSION}")) {
+  if (units_) units_->ExpectMap("{NAME: UNIT}");
+  Program program(0);
+  Scope scope(program);
+  for (const auto& [name, node] : EntriesOf(entry, "constants", "{NAME: NUMBER}")) {
+    Constant& constant = constants_.emplace_back(Constant{name, {}, node});
+    const Value value = ParseExpression(node, scope);
+    for (const int element : value.nodes) {
+      const auto number = program.ConstantValue(element);
+      if (!number) node.Fail("the constant has no finite value", "a number, such as 2 or 30deg");
+      constant.values.push_back(*number);
+    }
+    scope.Declare(name, {value}, node);
+  }
+}
+
+std::vector<Space> FormulaKeys::ReadSpaces(const char* key, unsigned flags) const {
+  std::vector<Space> spaces;
+  for (const auto& [name, node] : EntriesOf(entry_, key, "{NAME: GEOMETRY}")) {
+    spaces.push_back(ReadSpace(name, node));
+    spaces.back().flags = flags;
+  }
+  return spaces;
+}
+
+Space FormulaKeys::ReadSpace(const std::string& name, const Node& node) const {
+  Space space;
+  space.name = name;
+  if (node.kind() == Node::Kind::kList) {
+    for (const Node& item : node.Items()) {
+      space.elements.push_back(item.Text());
+      if (!IsIdentifier(space.elements.back()))
+        item.Fail("'" + space.elements.back() + "' cannot name an element", "a name such as x");
+    }
+    if (space.elements.empty()) node.Fail("the list is empty", "the names of the elements");
+    space.geometry = Geometry::Vector(static_cast<int>(space.elements.size()));
+  } else {
+    const std::vector<std::string> names = GeometryNames();
+    const std::string text = node.Text();
+    if (std::ranges::find(names, text) == names.end()) {
+      node.Fail("'" + text + "' is not a geometry",
+                Join(names) + ", or the list of the elements of a vector, such as [x, y]",
+                Nearest(text, names));
+    }
+    for (const GeometryRow* row : detail::kGeometryRows) {
+      if (text == row->name) space.geometry = Geometry(row->number);
+    }
+    space.elements = ElementsOf("", space.geometry);
+  }
+  space.unit = UnitOf(name, space.geometry);
+  return space;
+}
+
+std::string FormulaKeys::UnitOf(const std::string& name, const Geometry& geometry) const {
+  const auto unit = units_ ? units_->Find(name) : std::nullopt;
+  return unit ? unit->Text() : geometry.is_angle() ? "rad" : "";
+}
+
+void FormulaKeys::AddTo(Scope& scope) const {
+  for (const Constant& constant : constants_) {
+    Symbol symbol;
+    for (const double value : constant.values)
+      symbol.value.nodes.push_back(scope.program().Constant(value));
+    scope.Declare(constant.name, std::move(symbol), constant.node);
+  }
+  for (const auto& [name, node] : definitions_) scope.Define(name, node);
+}
+
+void FormulaKeys::CheckDefinitions(Scope& scope) const {
+  for (const auto& [name, node] : definitions_) static_cast<void>(scope.Find(name));
+}
+
+void FormulaKeys::RejectUnread() const {
+  if (units_) units_->RejectUnread();
+}
+
+Space Concatenated(const std::vector<Space>& spaces, const std::string& name) {
+  if (spaces.size() == 1) return spaces[0];
+  Space all;
+  if (spaces.empty()) return all;
+  all.name = name;
+  for (const Space& space : spaces) {
+    for (const std::string& element : ColumnNames(space.name, space))
+      all.elements.push_back(element);
+    if (&space == &spaces[0]) all.unit = space.unit;
+    if (space.unit != all.unit) all.unit.clear();
+  }
+  all.geometry = Geometry::Vector(static_cast<int>(all.elements.size()));
+  return all;
+}
+
+std::vector<Geometry> GeometriesOf(const std::vector<Space>& spaces) {
+  std::vector<Geometry> geometries;
+  for (const Space& space : spaces) geometries.push_back(space.geometry);
+  return geometries;
+}
+
+std::string ExpressionText(const Node& node) {
+  if (node.kind() != Node::Kind::kList) return node.Text();
+  std::vector<std::string> items;
+  for (const Node& item : node.Items()) items.push_back(item.Text());
+  return '[' + Join(items) + ']';
+}
+
+}  // namespace alidade::internal

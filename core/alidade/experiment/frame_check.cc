@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <span>
 
 #include "alidade/base/number_text.h"
 #include "alidade/experiment/truth_match.h"
@@ -119,18 +120,18 @@ void FrameCheck::Normalise(Channel& channel, std::vector<double>& value) {
     }
     if (defect > kCountedDefect) ++normalised_[channel.info.name];
     part.Normalise(x);
-    if (part.row().double_cover) {
-      ChooseSign({}, {x, static_cast<std::size_t>(part.ambient)});
-    }
+    if (part.row().quaternion >= 0) ChooseSign({}, {x + part.row().quaternion, 4});
   });
 }
 
 void FrameCheck::ChooseTruthSigns(SourceFrame& frame) {
   for (std::size_t t = 0; t < frame.truth.size(); ++t) {
     Channel& channel = truths_[t];
-    if (frame.truth[t].empty() || !channel.geometry.row().double_cover) continue;
-    ChooseSign(channel.previous, frame.truth[t]);
-    channel.previous = frame.truth[t];
+    const int first = channel.geometry.row().quaternion;
+    if (frame.truth[t].empty() || first < 0) continue;
+    const auto q = std::span(frame.truth[t]).subspan(static_cast<std::size_t>(first), 4);
+    ChooseSign(channel.previous, q);
+    channel.previous.assign(q.begin(), q.end());
   }
 }
 

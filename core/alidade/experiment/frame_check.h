@@ -35,7 +35,7 @@ class FrameCheck {
   struct Channel {
     StreamInfo info;
     Geometry geometry;                  ///< geometry of the values; a vector if it is unknown
-    std::vector<double> previous = {};  ///< previous value of a truth; empty for a stream
+    std::vector<double> previous = {};  ///< previous quaternion of a truth; empty for a stream
   };
 
   void Check(const SourceFrame& frame) const;

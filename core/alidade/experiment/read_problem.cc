@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "alidade/base/text.h"
@@ -37,14 +38,27 @@ void AddAt(const Node& entry, const Add& add) {
   }
 }
 
-/// Reads the value of a block: a number, a list, or {w: , x: , y: , z: } for a unit quaternion. A
-/// quaternion cannot be a list, because programs disagree about the order of its elements.
+/// Returns the neutral element of a geometry as a map of its elements, as in `{w: 1, x: 0, y: 0, z:
+/// 0}`.
+std::string IdentityMap(const Geometry& geometry) {
+  const std::vector<std::string> elements = internal::SplitNames(geometry.row().elements);
+  const std::vector<double> identity = geometry.Identity();
+  std::string map;
+  for (std::size_t i = 0; i < elements.size(); ++i) {
+    map += (i == 0 ? "" : ", ") + elements[i] + (identity[i] == 0.0 ? ": 0" : ": 1");
+  }
+  return '{' + map + '}';
+}
+
+/// Reads the value of a block: a number, a list, or a map such as {w: , x: , y: , z: } if the value
+/// contains a unit quaternion. A quaternion cannot be a list, because programs disagree about the
+/// order of its elements.
 std::vector<double> ReadMean(const Node& node, const Space& space) {
   const Geometry& geometry = space.geometry;
   std::vector<double> mean;
-  const bool double_cover = geometry.row().double_cover;
-  if (double_cover) {
-    node.ExpectMap("{w: 1, x: 0, y: 0, z: 0}, the identity");
+  const int quaternion = geometry.row().quaternion;
+  if (quaternion >= 0) {
+    node.ExpectMap(IdentityMap(geometry) + ", the identity");
     for (const std::string& element : internal::SplitNames(geometry.row().elements)) {
       mean.push_back(node.At(element).Number());
     }
@@ -55,13 +69,16 @@ std::vector<double> ReadMean(const Node& node, const Space& space) {
   if (DistanceFrom(geometry, mean.data()) > kUnitTolerance) {
     node.Fail("the value does not have unit length", "a length within 1e-3 of 1");
   }
-  if (double_cover) internal::ChooseSign({}, mean);
+  if (quaternion >= 0) {
+    internal::ChooseSign({}, std::span(mean).subspan(static_cast<std::size_t>(quaternion), 4));
+  }
   return mean;
 }
 
 /// Returns the unit of the standard deviations of a block, or "" if its elements differ in units.
 std::string SigmaUnit(const Space& space) {
-  if (!space.parts.empty()) return {};
+  const bool has_one_unit = space.geometry.is_vector() || space.geometry.is_angular();
+  if (!space.parts.empty() || !has_one_unit) return {};
   return space.geometry.tangent < space.geometry.ambient ? "rad" : space.unit;
 }
 
@@ -137,7 +154,9 @@ std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& mo
 
 /// Returns an example of the initial value of a block, for messages.
 std::string InitialExample(const Space& space) {
-  if (space.geometry.row().double_cover) return "{mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0.1}";
+  if (space.geometry.row().quaternion >= 0) {
+    return "{mean: " + IdentityMap(space.geometry) + ", sigma: 0.1}";
+  }
   std::string mean = "0";
   for (int i = 1; i < space.geometry.ambient; ++i) mean += ", 0";
   return "{mean: " + (space.geometry.ambient > 1 ? '[' + mean + ']' : mean) + ", sigma: 0.1}";

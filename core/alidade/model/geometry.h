@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "alidade/model/plugin_abi.h"
+#include "alidade/model/rotation.h"
 
 /// Geometries of state blocks, measurements and inputs. A geometry defines the sum of a value and a
 /// small vector, y = x (+) d, and the difference of two values, d = y (-) x. Every geometry
@@ -18,7 +19,8 @@
 ///
 /// The scalar types of x and d are template parameters: double or a dual number.
 ///
-/// A geometry of fixed size has an entry in alidade/state/geometry_table.h, and is a struct with
+/// alidade/model/euclidean_group.h contains the Euclidean groups. A geometry of fixed size has an
+/// entry in alidade/state/geometry_table.h, and is a struct with
 ///
 ///   kGeometry                constant of the geometry in plugin_abi.h, such as ALIDADE_ANGLE
 ///   kAmbient, kTangent       number of elements of a value and of d
@@ -184,22 +186,9 @@ struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
     Multiply(conjugate, y, q);
     Log(q, d);
   }
-  /// Computes the right Jacobian of SO(3), with t = |d| and [d]x^2 = d d' - t^2 I:
-  ///
-  ///   J = I - (1 - cos t) / t^2 [d]x + (t - sin t) / t^3 [d]x^2     [Sola2017] eq. 183
+  /// Computes the right Jacobian of SO(3).
   static void PlusJacobian(const double*, const double* d, double* j) {
-    const double t2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], t = std::sqrt(t2);
-    constexpr double kSeries = 1e-4;
-    const double a = t < kSeries ? 0.5 - t2 / 24.0 : (1.0 - std::cos(t)) / t2;
-    const double b = t < kSeries ? 1.0 / 6.0 - t2 / 120.0 : (t - std::sin(t)) / (t2 * t);
-    const double cross[9] = {0.0, -d[2], d[1], d[2], 0.0, -d[0], -d[1], d[0], 0.0};
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) {
-        const double unit = row == column ? 1.0 : 0.0;
-        j[3 * row + column] =
-            unit - a * cross[3 * row + column] + b * (d[row] * d[column] - t2 * unit);
-      }
-    }
+    Rotation::RightJacobian(d, j);
   }
 };
 

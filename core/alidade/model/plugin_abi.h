@@ -49,7 +49,7 @@ extern "C" {
 #endif
 
 #define ALIDADE_ABI_MAJOR 1
-#define ALIDADE_ABI_MINOR 0
+#define ALIDADE_ABI_MINOR 1
 #define ALIDADE_MAGIC 0x4144494cu /* "LIDA" */
 #define ALIDADE_ENTRY_SYMBOL "alidade_plugin"
 #define ALIDADE_BUILD_TAG_SECTION ".alidade"
@@ -153,12 +153,25 @@ typedef struct AlidadeBuildTag {
  * ALIDADE_UNIT_VECTOR      ambient 3, tangent 2      x (+) d = cos |d| x + sin |d| / |d| B(x) d
  * ALIDADE_PRODUCT          sums of the parts         concatenation of the parts, each with its
  *                                                    own (+); only for measurements
+ * ALIDADE_SE_2_LEFT        ambient 3, tangent 3      x, y, theta; x (+) d = x Exp(d)
+ * ALIDADE_SE_2_RIGHT       ambient 3, tangent 3      the same elements; x (+) d = Exp(d) x
+ * ALIDADE_SE_3_LEFT        ambient 7, tangent 6      position, then quaternion; x (+) d = x Exp(d)
+ * ALIDADE_SE_3_RIGHT       ambient 7, tangent 6      the same elements; x (+) d = Exp(d) x
+ * ALIDADE_SE_2_3_LEFT      ambient 10, tangent 9     position, quaternion, velocity;
+ *                                                    x (+) d = x Exp(d)
+ * ALIDADE_SE_2_3_RIGHT     ambient 10, tangent 9     the same elements; x (+) d = Exp(d) x
  *
  * B(x) of a unit vector, with s = -1 if x2 < 0, else s = 1 (also for x2 = -0), a = -1 / (s + x2):
  *
  *            [ 1 + s x0^2 a    x0 x1 a     ]
  *   B(x)  =  [ s x0 x1 a       s + x1^2 a  ]
  *            [ -s x0           -x1         ]
+ *
+ * The product of two poses is (p, R) (p', R') = (p + R p', R R'). A velocity transforms like a
+ * position. With V = I + (1 - cos t)/t^2 W + (t - sin t)/t^3 W^2, W = [phi]x and t = |phi|,
+ * Exp(rho, phi, nu) has the position V rho, the rotation Exp(phi) and the velocity V nu. In the
+ * plane, W = [0 -theta; theta 0]. The numbers from ALIDADE_SE_2_LEFT on require a host with minor
+ * version 1 or later.
  *
  * If y is the antipode of x, several shortest d exist, and y (-) x = (pi, 0).
  * docs/plugin_abi.md contains an example of each geometry. */
@@ -167,7 +180,13 @@ enum {
   ALIDADE_ANGLE = 2,
   ALIDADE_UNIT_QUATERNION = 3,
   ALIDADE_UNIT_VECTOR = 4,
-  ALIDADE_PRODUCT = 5
+  ALIDADE_PRODUCT = 5,
+  ALIDADE_SE_2_LEFT = 6,
+  ALIDADE_SE_2_RIGHT = 7,
+  ALIDADE_SE_3_LEFT = 8,
+  ALIDADE_SE_3_RIGHT = 9,
+  ALIDADE_SE_2_3_LEFT = 10,
+  ALIDADE_SE_2_3_RIGHT = 11
 };
 
 /* Bits of AlidadeSpace.flags. */

@@ -8,6 +8,7 @@
 #include <tuple>
 #include <type_traits>
 
+#include "alidade/model/euclidean_group.h"
 #include "alidade/model/geometry.h"
 #include "alidade/model/jet.h"
 
@@ -21,8 +22,10 @@ struct GeometryRow {
   const char* elements = "";          ///< comma-separated element names of a value; "": numbers
   const char* tangent_elements = "";  ///< element names of a difference; "": equal to `elements`
   std::uint32_t angular = 0;          ///< bit i: element i of a difference is an angle in rad
-  bool double_cover = false;          ///< true if x and -x are the same value
-  int ambient = 0, tangent = 0;       ///< sizes of a value and a difference; 0: set by the model
+  /// Index of the first element of a unit quaternion q in a value, q and -q being the same value.
+  /// -1: the value contains no quaternion.
+  int quaternion = -1;
+  int ambient = 0, tangent = 0;  ///< sizes of a value and a difference; 0: set by the model
   const double* identity = nullptr;
   void (*plus)(const double* x, const double* d, double* y) = nullptr;
   void (*minus)(const double* y, const double* x, double* d) = nullptr;
@@ -82,6 +85,22 @@ struct TypedRow : GeometryRow {
   }
 };
 
+/// Entries of the geometries of a group, with the left-invariant and the right-invariant error.
+inline constexpr GeometryRow kSe2Row{
+    .elements = "x,y,theta", .tangent_elements = "dx,dy,dtheta", .angular = 0b100};
+inline constexpr GeometryRow kSe3Row{.elements = "x,y,z,qw,qx,qy,qz",
+                                     .tangent_elements = "dx,dy,dz,rx,ry,rz",
+                                     .angular = 0b111000,
+                                     .quaternion = 3};
+inline constexpr GeometryRow kSe23Row{.elements = "x,y,z,qw,qx,qy,qz,vx,vy,vz",
+                                      .tangent_elements = "dx,dy,dz,rx,ry,rz,dvx,dvy,dvz",
+                                      .angular = 0b000111000,
+                                      .quaternion = 3};
+constexpr GeometryRow Named(GeometryRow row, const char* name) {
+  row.name = name;
+  return row;
+}
+
 /// All geometries of fixed size. To add a geometry, add a struct to alidade/model/geometry.h and an
 /// entry here.
 inline constexpr std::tuple kGeometries{
@@ -90,9 +109,15 @@ inline constexpr std::tuple kGeometries{
                               .elements = "w,x,y,z",
                               .tangent_elements = "rx,ry,rz",
                               .angular = 0b111,
-                              .double_cover = true}),
+                              .quaternion = 0}),
     TypedRow<UnitVector>(
         {.name = "unit_vector", .elements = "x,y,z", .tangent_elements = "d0,d1", .angular = 0b11}),
+    TypedRow<LeftInvariant<Se2>>(Named(kSe2Row, "se_2_left")),
+    TypedRow<RightInvariant<Se2>>(Named(kSe2Row, "se_2_right")),
+    TypedRow<LeftInvariant<Se3>>(Named(kSe3Row, "se_3_left")),
+    TypedRow<RightInvariant<Se3>>(Named(kSe3Row, "se_3_right")),
+    TypedRow<LeftInvariant<Se23>>(Named(kSe23Row, "se_2_3_left")),
+    TypedRow<RightInvariant<Se23>>(Named(kSe23Row, "se_2_3_right")),
 };
 
 inline constexpr GeometryRow kVectorRow{.number = ALIDADE_VECTOR, .name = "vector"};

@@ -3,6 +3,7 @@
 // Tests the unscented filter on blocks of every geometry, and on a state without a covariance.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <tuple>
@@ -32,13 +33,13 @@ struct Wandering : Motion<G::kTangent, G> {
   }
 };
 
-/// Returns a problem with `n` tangent elements in blocks of the geometry G. Each block has its own
-/// sensor.
+/// Returns a problem with `n` tangent elements in blocks of the geometry G, or with one block if G
+/// has more elements. Each block has its own sensor.
 template <class G>
 Problem Wanderers(int n) {
   Problem problem;
   const SharedMotion model = MakeMotion(Wandering<G>(), "wandering");
-  for (int i = 0; i < n / G::kTangent; ++i) {
+  for (int i = 0; i < std::max(1, n / G::kTangent); ++i) {
     const std::string name = "b" + std::to_string(i);
     const BlockId id = problem.layout.Declare(name + ".x", name, model->blocks()[0]);
     problem.motions.push_back({name, model, {id}});

@@ -20,7 +20,7 @@ constexpr int kPoints = 200;
 // Tolerance for the rounding errors of a dozen operations on numbers up to 10.
 constexpr double kTolerance = 2e-14;
 
-using Values = std::array<double, 7>;
+using Values = std::array<double, 10>;
 
 struct Case {
   const char* name;
@@ -128,7 +128,7 @@ TEST_P(GeometryLaws, TransportIsOrthogonalAndTheIdentityAtOnePoint) {
   const int n = geometry_.tangent;
   for (int i = 0; i < kPoints; ++i) {
     const Values from = Point(), to = Point();
-    std::array<double, 49> j{}, back{}, same{};
+    std::array<double, 81> j{}, back{}, same{};
     geometry_.Transport(from.data(), to.data(), j.data());
     geometry_.Transport(to.data(), from.data(), back.data());
     geometry_.Transport(from.data(), from.data(), same.data());
@@ -145,17 +145,22 @@ TEST_P(GeometryLaws, TransportIsOrthogonalAndTheIdentityAtOnePoint) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(AllKinds, GeometryLaws,
-                         ::testing::Values(Case{"vector", Geometry::Vector(5), 1e9},
-                                           Case{"angle", Geometry::Angle(), kPi},
-                                           Case{"unit_quaternion", Geometry::UnitQuaternion(), kPi},
-                                           Case{"unit_vector", Geometry::UnitVector(), kPi},
-                                           Case{"product",
-                                                Geometry::Product({Geometry::Vector(2),
-                                                                   Geometry::Angle(),
-                                                                   Geometry::UnitVector()}),
-                                                kPi}),
-                         [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    AllKinds, GeometryLaws,
+    ::testing::Values(
+        Case{"vector", Geometry::Vector(5), 1e9}, Case{"angle", Geometry::Angle(), kPi},
+        Case{"unit_quaternion", Geometry::UnitQuaternion(), kPi},
+        Case{"unit_vector", Geometry::UnitVector(), kPi},
+        Case{"se_2_left", Geometry(ALIDADE_SE_2_LEFT), kPi},
+        Case{"se_2_right", Geometry(ALIDADE_SE_2_RIGHT), kPi},
+        Case{"se_3_left", Geometry(ALIDADE_SE_3_LEFT), kPi},
+        Case{"se_3_right", Geometry(ALIDADE_SE_3_RIGHT), kPi},
+        Case{"se_2_3_left", Geometry(ALIDADE_SE_2_3_LEFT), kPi},
+        Case{"se_2_3_right", Geometry(ALIDADE_SE_2_3_RIGHT), kPi},
+        Case{"product",
+             Geometry::Product({Geometry::Vector(2), Geometry::Angle(), Geometry::UnitVector()}),
+             kPi}),
+    [](const auto& test) { return std::string(test.param.name); });
 
 TEST(Product, WrapsItsAnglesAndNothingElse) {
   const Geometry polar = Geometry::Product({Geometry::Vector(1), Geometry::Angle()});
@@ -392,9 +397,9 @@ TEST(GeometryTable, DerivativesInClosedFormAreThoseOfPlus) {
   const auto visit = [&]<class G>(G) {
     const Geometry geometry = Geometry::Of<G>();
     std::vector<double> x = geometry.Identity();
-    static_assert(detail::kMaxTangent <= 6);
-    const double turn[6] = {0.4, -0.7, 0.2, 0.5, -0.1, 0.3},
-                 d[6] = {-0.3, 1.1, 0.6, -0.2, 0.4, 0.9};
+    static_assert(detail::kMaxTangent <= 9);
+    const double turn[9] = {0.4, -0.7, 0.2, 0.5, -0.1, 0.3, -0.8, 0.6, 0.1},
+                 d[9] = {-0.3, 1.1, 0.6, -0.2, 0.4, 0.9, 0.7, -0.5, 0.2};
     geometry.Plus(x.data(), turn, x.data());
     std::array<double, detail::kMaxTangent * detail::kMaxTangent> closed{}, dual{};
     PlusJacobian(geometry, x.data(), d, closed.data());

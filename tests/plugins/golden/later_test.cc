@@ -13,14 +13,14 @@ using LaterPlugin = HostTest;
 
 TEST_F(LaterPlugin, ThatNeedsALaterHostIsRefused) {
   ExpectRefused(Built("later_needs"),
-                {"needs plugin ABI 1.3", "this program has 1.0", "use a later version of alidade"});
+                {"needs plugin ABI 1.3", "this program has 1.1", "use a later version of alidade"});
 }
 
 TEST_F(LaterPlugin, WithLargerStructsAndUnknownHintsWorks) {
   const PluginHost host({Built("later")});
   const AlidadeBuildTag tag = ReadBuildTag(Built("later"));
   EXPECT_GT(tag.struct_size, sizeof(AlidadeBuildTag));
-  EXPECT_EQ(tag.abi_minor, 3);
+  EXPECT_EQ(tag.abi_minor, 4);
   const SharedSensor sensor = host.CreateSensor("later_sensor", Parse("gain: 1.5").root());
   const double x = 3.0, b = 0.5;
   const double* roles[] = {&x, &b};

@@ -219,7 +219,7 @@ TEST_F(HostTest, InstructionsThatTheProcessorLacksAreRefused) {
 }
 
 TEST_F(HostTest, ABuildTagThatAsksForMoreThanThisHostIsRefused) {
-  ExpectRefused(Built("needs_minor"), {"needs plugin ABI 1.3", "this program has 1.0"});
+  ExpectRefused(Built("needs_minor"), {"needs plugin ABI 1.3", "this program has 1.1"});
   ExpectRefused(Built("later_flag"), {"flags that this version does not know: 0x8000000"});
   ExpectRefused(Built("reserved_tag"), {"its build tag uses reserved members"});
   const PluginHost host({Built("later_hint")});

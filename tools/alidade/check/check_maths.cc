@@ -221,9 +221,9 @@ CheckResult CheckDoubleCover(Context& context) {
     for (std::size_t i = 0; i < f.slots.size() && !f.outputs.empty(); ++i) {
       const Space& space = context.model().slots[static_cast<std::size_t>(f.slots[i])];
       space.geometry.ForEachPart([&](const Geometry& part, int offset, int) {
-        if (!part.row().double_cover) return;
+        if (part.row().quaternion < 0) return;
         has_quaternion = true;
-        CompareCovers(context, f, i, offset, worst);
+        CompareCovers(context, f, i, offset + part.row().quaternion, worst);
       });
     }
   }

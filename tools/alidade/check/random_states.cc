@@ -61,9 +61,12 @@ std::vector<std::vector<double>> Edges(const Geometry& geometry) {
       geometry.Plus(edges.back().data(), d.data(), edges.back().data());
     }
   }
-  if (geometry.row().double_cover) {
+  if (const int q = geometry.row().quaternion; q >= 0) {
     edges.push_back(identity);
-    for (double& element : edges.back()) element = -element;
+    for (int i = q; i < q + 4; ++i) {
+      double& element = edges.back()[static_cast<std::size_t>(i)];
+      element = -element;
+    }
   }
   return edges;
 }

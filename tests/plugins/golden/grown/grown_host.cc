@@ -16,7 +16,7 @@ namespace alidade {
 namespace {
 
 // The structs are larger than those of 1.0.
-static_assert(ALIDADE_ABI_MINOR == 3);
+static_assert(ALIDADE_ABI_MINOR == 4);
 static_assert(sizeof(AlidadeTable) > 80 && sizeof(AlidadeEntry) > 104 && sizeof(AlidadeSpace) > 88);
 static_assert(offsetof(AlidadeHost, taken) == 40 && offsetof(AlidadeObservation, taken) == 56);
 

@@ -54,7 +54,8 @@ ExitCode RunSimulate(const SimulateArguments& arguments) {
     std::string text = std::to_string(result.frames) + " frames\nwrote " + path.string() + '\n';
     for (const std::string& file : result.files) text += "  " + (path / file).string() + '\n';
     text += "\nrun it with: alidade run CONFIG --set source.path=" +
-            internal::ShellWord(path.string()) + "   if source.type of CONFIG is tracks or csv\n";
+            internal::ShellWord(path.string()) +
+            "   if source.type of CONFIG is tracks or tables\n";
     PrintText(text);
   }
   if (!result.stopped) return ExitCode::kOk;

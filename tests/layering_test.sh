@@ -32,7 +32,7 @@
 #   flags     CMake files contain no instruction-set flag and no fast-math flag (except for the
 #             deliberately faulty plugins in tests/faults and tests/plugins)
 #   named     core and tools contain neither the name of a shipped C++ plugin nor the name of its
-#             file: a plugin declares its capabilities itself (`csv`, `scene` and `tracks` are
+#             file: a plugin declares its capabilities itself (`scene`, `tables` and `tracks` are
 #             allowed, because they are also ordinary words)
 set -euo pipefail
 
@@ -331,23 +331,23 @@ for header in '"stereo_disparity.h"' '"motion_models/constant.h"' '"../motion_mo
   plant model motion_models/new.cc "$licence\n#include ${header/stereo_disparity/scale_2d}"
 done
 for file in core/alidade/experiment/new.cc sensors/new.h cli/new.cc tests/core/new.cc bench/speed/new.cc examples/new.cc; do
-  plant plugin "$file" "$licence\n#include \"plugins/csv/csv.h\""
+  plant plugin "$file" "$licence\n#include \"plugins/tables/tables.h\""
 done
-plant plugin tests/sensors/new.cc "$licence\n#include \"../../plugins/csv/csv.h\""
+plant plugin tests/sensors/new.cc "$licence\n#include \"../../plugins/tables/tables.h\""
 mkdir -p "$copy/plugins/depth_target" && echo "$licence" >"$copy/plugins/depth_target/planted.h"
-plant plugin plugins/csv/new.cc "$licence\n#include \"../depth_target/planted.h\""
-plant plugin plugins/csv/new.cc "$licence\n#include \"depth_target/planted.h\""
+plant plugin plugins/tables/new.cc "$licence\n#include \"../depth_target/planted.h\""
+plant plugin plugins/tables/new.cc "$licence\n#include \"depth_target/planted.h\""
 for header in cli/main.h bench/speed/x.h tests/support/x.h ../tests/support/x.h; do
-  plant upward plugins/csv/new.cc "$licence\n#include \"$header\""
+  plant upward plugins/tables/new.cc "$licence\n#include \"$header\""
   plant upward sensors/new.cc "$licence\n#include \"$header\""
 done
 for header in yaml-cpp/yaml.h boost/dll.hpp spdlog/spdlog.h openssl/evp.h nlohmann/json.hpp; do
   plant library core/alidade/experiment/new.h "$licence\n#include <$header>"
 done
-for file in plugins/csv/new.cc cli/new.cc tests/core/new.cc; do
+for file in plugins/tables/new.cc cli/new.cc tests/core/new.cc; do
   plant library "$file" "$licence\n#include <yaml-cpp/yaml.h>"
 done
-for file in core/alidade/experiment/new.cc plugins/csv/new.cc tests/core/new.cc; do
+for file in core/alidade/experiment/new.cc plugins/tables/new.cc tests/core/new.cc; do
   plant library "$file" "$licence\n#include <CLI/App.hpp>"
 done
 for header in boost/math/distributions/chi_squared.hpp spdlog/spdlog.h sys/stat.h; do
@@ -356,9 +356,9 @@ done
 plant library core/alidade/base/new.cc "$licence\n#include <Eigen/Core>"
 allow core/alidade/state/new.h "$licence\n#include <Eigen/Core>\n#include \"alidade/base/error.h\""
 plant library core/alidade/experiment/new.cc "$licence\n#include <ceres/problem.h>"
-plant library plugins/csv/new.cc "$licence\n#include \"ceres/ceres.h\""
+plant library plugins/tables/new.cc "$licence\n#include \"ceres/ceres.h\""
 plant library core/alidade/experiment/new.cc "$licence\n#include <opencv2/core.hpp>"
-plant library plugins/csv/new.cc "$licence\n#include <opencv2/core.hpp>"
+plant library plugins/tables/new.cc "$licence\n#include <opencv2/core.hpp>"
 plant library tests/plugins/new.cc "$licence\n#include <opencv2/core.hpp>"
 for call in 'std::exit(1);' 'exit (1);' 'std::abort();' 'abort();' '::_exit(0);' 'if (x) std::quick_exit(1);' \
   'std::terminate();' '/* why */ abort();'; do
@@ -368,7 +368,7 @@ for call in 'std::cout << 1;' 'std::cerr << 1;' 'printf("x");' 'std::printf("//"
   'fprintf(stdout, "x");' 'std::fputs("x", stderr);' 'std::print("x");'; do
   plant print core/alidade/experiment/new.cc "$licence\n$call"
 done
-for file in sensors/new.cc motion_models/new.h plugins/csv/new.cc; do
+for file in sensors/new.cc motion_models/new.h plugins/tables/new.cc; do
   plant exit "$file" "$licence\nabort();"
   plant print "$file" "$licence\nputs(\"x\");"
 done
@@ -391,10 +391,10 @@ allow tests/core/io/json_test.cc '#include <nlohmann/json.hpp>'
 allow core/alidade/experiment/new.cc "$licence\n// std::cout, abort()\n/* exit(1);\n printf(\"x\") */ int a = std::snprintf(b, 3, \"exit(1)\");"
 allow core/alidade/experiment/new.cc "$licence\nloop.abort(); p->exit(); my_exit(); stop::exit_code(); char c = '\"'; f(\"std::cout <<\");"
 allow core/alidade/experiment/new.cc "$licence\nif (fork() == 0) _exit(0);"
-allow core/alidade/experiment/new.cc "$licence\nf(\"tracks\", \"csv\", EstimatorKind::kSlidingWindow);  // my_fixed_lag_s"
-allow plugins/csv/new.cc "$licence\nconst char* kName = \"ceres_batch\";"
+allow core/alidade/experiment/new.cc "$licence\nf(\"tracks\", \"tables\", EstimatorKind::kSlidingWindow);  // my_fixed_lag_s"
+allow plugins/tables/new.cc "$licence\nconst char* kName = \"ceres_batch\";"
 allow sensors/new.cc "$licence\n#include \"new.h\"\n#include <cmath>\n#include <Eigen/Dense>\n#include \"alidade/model/model.h\""
-allow plugins/csv/new.cc "$licence\n#include \"own.h\"\n#include <fcntl.h>\n#include \"sensors/scale_2d.h\""
+allow plugins/tables/new.cc "$licence\n#include \"own.h\"\n#include <fcntl.h>\n#include \"sensors/scale_2d.h\""
 allow plugins/ceres/batch/new.cc "$licence\n#include <ceres/ceres.h>"
 allow plugins/image_sequence/new.cc "$licence\n#include <opencv2/core.hpp>"
 allow plugins/tracks/images/new.cc "$licence\n#include <opencv2/core.hpp>"
@@ -403,7 +403,7 @@ allow bench/speed/new.cc "$licence\n#include <ceres/problem.h>\n#include \"plugi
 allow bench/speed/new.cc "$licence\n#include <CLI/CLI.hpp>\n#include <opencv2/core.hpp>"
 allow cli/new.cc "$licence\n#include <CLI/CLI.hpp>\nint main() { std::cout << 1; }"
 allow tests/core/new.cc "$licence\n#include \"sensors/scale_2d.h\"\n#include \"alidade/config/tree.h\""
-allow tests/plugins/new.cc "$licence\n#include \"plugins/csv/csv.h\""
+allow tests/plugins/new.cc "$licence\n#include \"plugins/tables/tables.h\""
 allow tests/faults/CMakeLists.txt '# SPDX-License-Identifier: Apache-2.0\nadd_compile_options(-ffast-math)'
 allow tests/plugins/CMakeLists.txt '# SPDX-License-Identifier: Apache-2.0\nadd_compile_options(-march=native)'
 allow cmake/New.cmake '# SPDX-License-Identifier: Apache-2.0\n# never -march=native'

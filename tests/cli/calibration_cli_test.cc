@@ -42,7 +42,7 @@ class CalibrationCli : public testing::ProgramTest {
                             "sensors:\n  stereo: {model: stereo_disparity, stream: disparity, "
                             "sigma_px: 1, roles: {depth: target.depth}" +
                             keys +
-                            "}\nsource: {type: csv, path: table.csv, streams: {disparity: d}}\n"
+                            "}\nsource: {type: tables, path: table.csv, streams: {disparity: d}}\n"
                             "estimators: {ekf: {type: ekf}}\n");
   }
 

@@ -117,9 +117,9 @@ TEST_F(CheckProgram, SaysWhichPluginsAreMissingOrRefused) {
   EXPECT_EQ(file.code, 69);
   EXPECT_TRUE(Contains(file.err, "nowhere.so: no such file or folder")) << file.err;
   EXPECT_TRUE(Contains(missing.err, "\n  searched /")) << missing.err;
-  const Outcome source = Call({"check", "csv"});
+  const Outcome source = Call({"check", "tables"});
   EXPECT_EQ(source.code, 69);
-  EXPECT_EQ(source.err, "error: 'csv' is a source; expected a sensor or motion model\n");
+  EXPECT_EQ(source.err, "error: 'tables' is a source; expected a sensor or motion model\n");
   const Outcome built_in = Call({"check", "ekf"});
   EXPECT_EQ(built_in.code, 69);
   EXPECT_TRUE(built_in.err.starts_with("error: 'ekf' is a built-in estimator; expected a sensor "))

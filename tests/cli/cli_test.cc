@@ -359,7 +359,7 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
   EXPECT_FALSE(Contains(list.out, ".so")) << list.out;
   EXPECT_FALSE(Contains(list.out, "built in")) << list.out;
   const Outcome with_files = Call({"plugins", "list", "-v"});
-  EXPECT_TRUE(Contains(with_files.out, "/alidade_csv.so\n")) << with_files.out;
+  EXPECT_TRUE(Contains(with_files.out, "/alidade_tables.so\n")) << with_files.out;
   EXPECT_TRUE(Contains(with_files.out, "  built in\n")) << with_files.out;
   const Outcome info = Call({"plugins", "info", "stereo_disparity"});
   EXPECT_EQ(info.code, 0);

@@ -395,7 +395,7 @@ state:
 sensors:
   gps: {model: planar_fix, stream: gps, roles: {position: robot.position}, sigma_m: 0.3}
 source:
-  type: csv
+  type: tables
   path: drive.csv
   streams: {gps: [gx, gy], odometry: [v, o]}
   truth: {robot.position: [tx, ty], robot.heading: th}

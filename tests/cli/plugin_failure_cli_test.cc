@@ -27,7 +27,7 @@ TEST_F(PluginFailureCli, AnExceptionOfAPluginInCIsNamedAndNoEndOfTheProgram) {
 plugins: [)" + plugin + R"(]
 state: {s: {model: constant, size: 1, initial: {value: {mean: 1, sigma: 1}}}}
 sensors: {bad: {model: throws_in_eval, stream: z, roles: {x: s.value}}}
-source: {type: csv, path: rows.csv, streams: {z: u}}
+source: {type: tables, path: rows.csv, streams: {z: u}}
 estimators: {ekf: {type: ekf}}
 )");
   const auto run = [&](const std::string& key, const std::string& value) {
@@ -83,7 +83,7 @@ state:
   s: {model: constant, size: 1, initial: {value: {mean: 1, sigma: 1}}}
   t: {model: constant, size: 1, initial: {value: {mean: 1, sigma: 1}}}
 sensors: {bad: {model: throws_in_noise, stream: z, roles: {x: s.value, y: t.value}}}
-source: {type: csv, path: rows.csv, streams: {z: [u, v]}}
+source: {type: tables, path: rows.csv, streams: {z: [u, v]}}
 estimators: {ekf: {type: ekf}}
 )");
   const auto policy = [&](const std::string& name) {

@@ -433,7 +433,7 @@ TEST_F(SweepCli, RecordsTheInputsOfEveryValue) {
   EXPECT_TRUE(Contains(inputs, "/a.csv\", \"bytes\"")) << inputs;
   EXPECT_TRUE(Contains(inputs, "/b.csv\", \"bytes\"")) << inputs;
   EXPECT_FALSE(Contains(inputs, "/table.csv\"")) << inputs;
-  EXPECT_TRUE(Contains(inputs, "\"alidade_csv.so\"")) << inputs;
+  EXPECT_TRUE(Contains(inputs, "\"alidade_tables.so\"")) << inputs;
 }
 
 TEST_F(SweepCli, RefusesWhatCannotBeVaried) {

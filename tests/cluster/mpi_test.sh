@@ -33,7 +33,7 @@ state:
 sensors:
   stereo: {model: stereo_disparity, stream: disparity, roles: {depth: target.depth},
            focal_px: 400, baseline_m: 0.065, sigma_px: 1.0}
-source: {type: csv, path: table.csv, streams: {disparity: d}}
+source: {type: tables, path: table.csv, streams: {disparity: d}}
 estimators: {ekf: {type: ekf}}
 YAML
 mpirun --oversubscribe -n 3 scripts/cluster/mpi_shard.sh "$work/bad" "$work/table.yaml" --runs 6 \

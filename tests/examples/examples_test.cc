@@ -390,8 +390,8 @@ TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
   }
 }
 
-// `simulate` writes one row for each satellite. `csv` combines six rows with one timestamp into a
-// frame.
+// `simulate` writes one row for each satellite. `tables` combines six rows with one timestamp
+// into a frame.
 TEST(Examples, SatellitesFromATableGiveTheSameEstimates) {
   const testing::TemporaryFolder folder;
   const std::string example = "23_satellites";
@@ -399,7 +399,7 @@ TEST(Examples, SatellitesFromATableGiveTheSameEstimates) {
   const std::string table = (folder / "data/ranges.csv").string();
   const RunResult straight = RunExample(example, {});
   const RunResult read = RunExample(
-      example, {{"source", "{type: csv, path: " + table +
+      example, {{"source", "{type: tables, path: " + table +
                                ", time: {repeats: true}, streams: {ranges: {columns: ranges, "
                                "known: [known0, known1, known2]}}}"}});
   EXPECT_EQ(read.frames, straight.frames);

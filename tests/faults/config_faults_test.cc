@@ -48,7 +48,7 @@ const std::string kEkf = "{type: ekf}", kDepthSource = "{type: depth_target, see
                   kPrior = "prior: {inverse_distance: 0.5, sigma: 0.25}";
 /// Returns a source that reads a table, as a replacement for the simulated target.
 std::string Rows(const std::string& keys) {
-  return "{type: csv, path: rows.csv, streams: {disparity: d, inverse_scale: s}, " + keys + "}";
+  return "{type: tables, path: rows.csv, streams: {disparity: d, inverse_scale: s}, " + keys + "}";
 }
 
 const Fault kTextFaults[] = {
@@ -60,7 +60,7 @@ const Fault kTextFaults[] = {
     MakeFault("07_leading_zeros", "depth", {{"400", "0400"}}, 19, "leading zero"),
     MakeFault("08_yes_for_a_flag", "depth",
               {{kDepthSource,
-                "{type: csv, path: rows.csv,\n  streams: {disparity: d,\n    inverse_scale: "
+                "{type: tables, path: rows.csv,\n  streams: {disparity: d,\n    inverse_scale: "
                 "{columns: [s], reciprocal: yes}}}"}},
               30, "true or false"),
     MakeFault("12_alias_bomb", "depth",
@@ -90,7 +90,7 @@ const Fault kTextFaults[] = {
     MakeFault(
         "24_shell_text", "depth",
         {{kDepthSource,
-          "{type: csv, path: \"$(touch hacked)\", streams: {disparity: d, inverse_scale: s}}"}},
+          "{type: tables, path: \"$(touch hacked)\", streams: {disparity: d, inverse_scale: s}}"}},
         28, "$(touch hacked)", 66),
     MakeFault("26_newer_schema", "depth", {{"alidade: 1", "alidade: 2"}}, 1, "newer"),
 };

@@ -193,8 +193,8 @@ TEST_F(DataFault, AnErrorFollowsTheTableAndShowsTheLine) {
   const std::string both = Read("both");
   EXPECT_TRUE(Contains(both, "\nreport   out/report.html\n")) << both;
   EXPECT_TRUE(both.ends_with(
-      "table.csv:3:5 d: 'abc' is not a number; expected a finite number, or 'source.missing: "
-      "[\"\", abc]'\n  3 | 0.1,abc\n    |     ^\n"))
+      "table.csv:3:5 d: 'abc' is not a number; expected a finite number, or 'missing: "
+      "[abc]'\n  3 | 0.1,abc\n    |     ^\n"))
       << both;
 }
 
@@ -214,14 +214,14 @@ TEST_F(DataFault, ATableWithoutAHeaderIsRecognised) {
       << outcome.err;
 }
 
-TEST_F(DataFault, AnEmptyCellNamesTheMissingCells) {
-  Write("table.csv", "t_s,d\n0,80\n0.1,\n");
-  const Outcome outcome = Run("table.yaml", {"--set", "source.missing=NA"}, 65);
+TEST_F(DataFault, AMissingTextIsAddedToTheEmptyCell) {
+  Write("table.csv", "t_s,d\n0,80\n0.1,\n0.2,NA\n");
+  const Outcome outcome = Run("table.yaml", {}, 65);
   EXPECT_TRUE(Contains(outcome.err,
-                       "table.csv:3:5 d: '' is an empty cell; expected a finite "
-                       "number, or 'source.missing: [NA, \"\"]'"))
+                       "table.csv:4:5 d: 'NA' is not a number; expected a finite "
+                       "number, or 'missing: [NA]'"))
       << outcome.err;
-  Run("table.yaml", {"--set", "source.missing=[NA, \"\"]"});
+  Run("table.yaml", {"--set", "source.missing=NA"});
 }
 
 // Tests fault 45 of tests/faults/README.md.
@@ -353,7 +353,7 @@ TEST_F(DataFault, QuaternionsOfAnotherLengthAreNormalisedAndCounted) {
   EXPECT_TRUE(Contains(tum.err, "truth.tum:1: the length of the quaternion is 1.0011")) << tum.err;
   // Here the quaternion is read from the columns of a table.
   const testing::Arguments columns = {"--set",
-                                      "source={type: csv, path: turn.csv, streams: {tracks: [w, "
+                                      "source={type: tables, path: turn.csv, streams: {tracks: [w, "
                                       "x]}, truth: {orientation: [w, x, y, z]}}"};
   Write("turn.csv", "t_s,w,x,y,z\n0,1,0,0,0\n0.1,0.6,0.8,0,0\n0.2,0.6,0.8,0.0003,0.04\n");
   Run("map.yaml", columns);
@@ -385,8 +385,8 @@ TEST_F(DataFault, SignsOfATruthDoNotDependOnTheOrderOfArrival) {
   Write("tracks.csv", Plane(0, 0.0));
   const testing::Arguments sorted = {
       "--set",
-      "source={type: csv, path: turn.csv, streams: {tracks: [w, x]}, truth: {orientation: [w, x, "
-      "y, z]}}",
+      "source={type: tables, path: turn.csv, streams: {tracks: [w, x]}, truth: {orientation: [w, "
+      "x, y, z]}}",
       "--set", "out_of_sequence={policy: buffer, window_s: 1}"};
   const std::string header = "t_s,w,x,y,z\n", first = "0,0.6,0.8,0,0\n",
                     last = "0.1,-0.6,0.8,0,0\n";

@@ -83,7 +83,7 @@ reference: truth
 /// Config with the stereo sensor only, and data from a table.
 inline const std::string kTableConfig =
     kTargetConfig + kStereoConfig +
-    R"(source: {type: csv, path: table.csv, streams: {disparity: d}}
+    R"(source: {type: tables, path: table.csv, streams: {disparity: d}}
 estimators: {ekf: {type: ekf}}
 )";
 

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "alidade/base/text.h"
+#include "alidade/config/data_paths.h"
 #include "alidade/config/tree.h"
 #include "alidade/io/near_file.h"
 #include "alidade/io/read_file.h"
@@ -136,6 +137,21 @@ void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
   for (const auto& plugin : plugins->children) anchor(plugin.get());
 }
 
+/// Makes the folder of the config the folder of `source.files` if `source` has no `path`.
+void AddFolderOfFiles(const ConfigTree& root) {
+  ConfigTree* const source = Child(root, "source");
+  if (source == nullptr || Child(*source, "path") != nullptr) return;
+  const ConfigTree* const files = Child(*source, "files");
+  if (files == nullptr) return;
+  auto path = std::make_unique<ConfigTree>();
+  path->kind = Node::Kind::kScalar;
+  path->place = files->place;
+  path->text = ".";
+  path->parent = source;
+  path->key = "path";
+  source->children.push_back(std::move(path));
+}
+
 /// Removes the key `include` from the map. Returns its value, or null if the key does not exist.
 std::unique_ptr<ConfigTree> ExtractInclude(ConfigTree* root) {
   auto& children = root->children;
@@ -162,6 +178,7 @@ class Loader {
     files_.push_back(file.string());
     if (files_.size() > kMaxFiles) FailAt(place, key, "too many includes", "at most 64 files");
     auto root = ParseRoot(ReadConfig(file, place, key), file.string(), &budget_);
+    AddFolderOfFiles(*root);
     AnchorPaths(*root, file.parent_path());
     const auto include = ExtractInclude(root.get());
     if (include == nullptr) return root;
@@ -343,6 +360,9 @@ void Config::Set(std::string_view dotted_key, std::string_view value, std::strin
 std::vector<std::string> Config::inputs() const {
   std::vector<std::string> inputs = files_;
   for (const ConfigTree* const path : SourcePaths(*tree_, {})) inputs.push_back(path->text);
+  for (const std::string& path : internal::DataPaths(*tree_)) {
+    if (path != "-") inputs.push_back(path);
+  }
   return inputs;
 }
 

@@ -92,9 +92,13 @@ void FrameCheck::Check(const SourceFrame& frame) const {
     }
     const int tangent = channel.geometry.tangent;
     if (!m.covariance.empty() && std::ssize(m.covariance) != tangent * tangent) {
-      Reject(frame, "a covariance of '" + channel.info.name + "' with " +
-                        std::to_string(m.covariance.size()) + " numbers, not " +
-                        std::to_string(tangent * tangent) + ',');
+      const std::string rows = std::to_string(tangent);
+      throw Error(ExitCode::kBadData,
+                  ErrorLine(source_.place(), channel.info.name,
+                            "the covariance has " + std::to_string(m.covariance.size()) +
+                                " numbers, but the measurement has " + rows +
+                                (tangent == 1 ? " degree" : " degrees") + " of freedom",
+                            "a covariance of " + rows + " x " + rows));
     }
   }
   if (frame.truth.size() > truths_.size()) {

@@ -244,7 +244,7 @@ TEST_F(ConfigFolder, IncludeLiesBelowTheFile) {
 
 TEST_F(ConfigFolder, RelativePathsAreTakenFromTheFileThatHasThem) {
   Write("parts/base.yaml", "source: {path: a.csv}\nplugins: [../x.so, /y.so]\n");
-  const fs::path file = Write("f.yaml", "include: parts/base.yaml\nsource: {type: csv}\n");
+  const fs::path file = Write("f.yaml", "include: parts/base.yaml\nsource: {type: tables}\n");
   const Config config = Config::FromFile(file);
   EXPECT_EQ(config.root().At("source").At("path").Text(), (folder_ / "parts/a.csv").string());
   const std::vector<Node> plugins = config.root().At("plugins").Items();

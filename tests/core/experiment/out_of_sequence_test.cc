@@ -235,7 +235,7 @@ TEST(Sort, LetsATableHaveItsRowsInAnyOrder) {
     std::string text = kFilters;
     const std::string source = "{type: depth_target, seed: 1}";
     text.replace(text.find(source), source.size(),
-                 "{type: csv, path: '" + (folder / "rows.csv").string() +
+                 "{type: tables, path: '" + (folder / "rows.csv").string() +
                      "', streams: {disparity: d, inverse_scale: s}}");
     const Config config = Config::FromText(text + time, "order.yaml");
     Experiment experiment = BuildExperiment(config, Host());

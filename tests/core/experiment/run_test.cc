@@ -609,10 +609,6 @@ TEST(Run, AFrameThatBreaksTheContractOfItsSourceEndsTheRun) {
               f.measurements[0].values = {1, 2};
             },
             "2 values of 'inverse_scale', not 1"},
-           {[](SourceFrame& f) {
-              f.measurements[0].covariance = {1, 0, 0, 1};
-            },
-            "a covariance of 'inverse_scale' with 4 numbers, not 1"},
            {[](SourceFrame& f) { f.measurements[0].stream = -1; },
             "a measurement with stream index -1, although the number of streams is 2"},
            {[](SourceFrame& f) { f.measurements[0].stream = 2; },
@@ -635,6 +631,21 @@ TEST(Run, AFrameThatBreaksTheContractOfItsSourceEndsTheRun) {
     EXPECT_EQ(result.frames, 3);
     EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
   }
+}
+
+// The size of a covariance can come from a config, so it is an error of the data.
+TEST(Run, ACovarianceOfAnotherSizeThanItsMeasurementEndsTheRun) {
+  Experiment experiment = MakeExperiment();
+  experiment.source = std::make_unique<Spoiling>([](SourceFrame& f) {
+    f.measurements[0].covariance = {1, 0, 0, 1};
+  });
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kBadData);
+  EXPECT_EQ(
+      result.reason,
+      "inverse_scale: the covariance has 4 numbers, but the measurement has 1 degree of freedom; "
+      "expected a covariance of 1 x 1");
+  EXPECT_EQ(result.frames, 3);
 }
 
 TEST(Run, TheSameSeedGivesTheSameMetricsTwice) {

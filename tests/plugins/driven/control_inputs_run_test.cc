@@ -214,6 +214,44 @@ TEST_F(DrivenTest, FramesThatComeLateGiveTheBytesOfThoseInOrder) {
   }
 }
 
+// The fixes are in a file of their own, and each row is 0.2 s late.
+TEST_F(DrivenTest, ADelayedStreamGivesTheBytesOfItsOwnTimes) {
+  const std::string estimators =
+      "{ekf: {type: ekf}, iekf: {type: iekf}, root: {type: square_root_ekf}, ukf: {type: ukf}, "
+      "rts: {type: rts}, batch: {type: ceres_batch}}";
+  const RunResult in_order = RunInto(Read({{"estimators", estimators}}), folder_ / "in_order");
+  ASSERT_EQ(in_order.status, RunStatus::kOk) << in_order.reason;
+  const fs::path drive = fs::path(kFolder) / "drive.csv";
+  std::ofstream late(folder_ / "fixes.csv");
+  late << "t_s,gps_m\n";
+  for (const std::string& line : testing::Lines(drive)) {
+    const auto cells = testing::Cells(line);
+    if (cells[0] != "t_s") late << std::stod(cells[0]) + 0.2 << ',' << cells[2] << '\n';
+  }
+  late.close();
+  const std::string source = "{type: tables, path: " + folder_.path().string() +
+                             ", files: [{path: fixes.csv, streams: {gps: {columns: gps_m, "
+                             "delay_s: 0.2}}}, {path: " +
+                             drive.string() +
+                             ", streams: {odometry: speed_m_s}, truth: {position: true_m}}]}";
+  for (const std::string order : {"reject", "buffer", "rollback"}) {
+    const std::string window = order == "reject" ? "" : ", window_s: 1";
+    const RunResult run = RunInto(Read({{"estimators", estimators},
+                                        {"source", source},
+                                        {"out_of_sequence", "{policy: " + order + window + "}"}}),
+                                  folder_ / order);
+    ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
+    EXPECT_EQ(run.arrivals.out_of_sequence > 0, order != "reject");
+    EXPECT_EQ(run.arrivals.dropped, 0);
+    for (const std::string& file : testing::FilesIn(folder_ / "in_order")) {
+      if (internal::HasWallClock(file)) continue;
+      if (file == "config.resolved.yaml" || file == "report.html") continue;
+      EXPECT_EQ(testing::Read(folder_ / "in_order" / file), testing::Read(folder_ / order / file))
+          << order << ' ' << file;
+    }
+  }
+}
+
 TEST_F(DrivenTest, WhatIsNotAnInputIsRefusedWithItsPlace) {
   EXPECT_EQ(Refusal("state.car.input.stream", "odometri"),
             "--set state.car.input.stream: the source has no stream 'odometri'; expected one of "

@@ -23,7 +23,7 @@ std::string Written(const fs::path& file, const std::string& text) {
 std::string InputsOf(const std::string& data, const std::vector<fs::path>& plugins = {},
                      const std::vector<std::string>& arguments = {"run"}) {
   const std::string path = data.empty() ? "" : ", path: '" + data + '\'';
-  const Config config = Config::FromText("source: {type: csv" + path + "}\n", "a.yaml");
+  const Config config = Config::FromText("source: {type: tables" + path + "}\n", "a.yaml");
   return InputsJson({arguments, {"a.b=1"}, {"/somewhere"}, {}}, config, {config},
                     HashFiles(plugins));
 }
@@ -85,7 +85,7 @@ TEST(RunInputs, HaveTheDataOfAllRunsOnce) {
   std::vector<Config> runs;
   for (const char* name : {"b.csv", "a.csv", "b.csv"}) {
     const std::string data = Written(folder / name, "1\n");
-    runs.push_back(Config::FromText("source: {type: csv, path: '" + data + "'}\n", "a.yaml"));
+    runs.push_back(Config::FromText("source: {type: tables, path: '" + data + "'}\n", "a.yaml"));
   }
   const std::string text = InputsJson({{"sweep"}, {}, {}}, runs[0], runs, {});
   const std::size_t first = text.find("/b.csv\""), second = text.find("/a.csv\"");
@@ -112,10 +112,10 @@ TEST(FindUsedPlugins, AreThoseOfModelsAndTypesAtAnyDepth) {
     return files;
   };
   EXPECT_EQ(names("alidade: 1\n"), std::vector<std::string>{});
-  const std::vector<std::string> expected = {"alidade_constant.so", "alidade_csv.so",
-                                             "alidade_scale_2d.so"};
+  const std::vector<std::string> expected = {"alidade_constant.so", "alidade_scale_2d.so",
+                                             "alidade_tables.so"};
   EXPECT_EQ(names("state: {a: {model: constant}}\n"
-                  "source: {type: csv, overrides: {sensors: {s: {model: scale_2d}}}}\n"
+                  "source: {type: tables, overrides: {sensors: {s: {model: scale_2d}}}}\n"
                   "estimators: {e: {type: ekf}}\n"),
             expected);
   EXPECT_EQ(names("estimators: {e: {overrides: {state: {a: {model: constant}}}}}\n"),

@@ -55,7 +55,7 @@ sensors:
     focal_px: 400
     baseline_m: 0.065
     sigma_px: 1.0
-source: {type: csv, path: data.csv, streams: {disparity: disparity_px}}
+source: {type: tables, path: data.csv, streams: {disparity: disparity_px}}
 estimators: {ekf: {type: ekf}}
 """
 # Colours of the pixels of each canvas with a size, as numbers of distinct colours.

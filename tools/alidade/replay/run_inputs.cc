@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <set>
 #include <sstream>
 #include <system_error>
 
 #include "alidade/base/text.h"
+#include "alidade/config/data_paths.h"
 #include "alidade/io/json.h"
 #include "alidade/io/output_file.h"
 #include "alidade/io/read_file.h"
@@ -57,14 +57,6 @@ std::vector<std::string> JsonStrings(const std::vector<std::string>& texts) {
   return strings;
 }
 
-/// Returns the value of `source.path`. Returns "" if the config does not contain this key.
-std::string SourcePath(const Config& config) {
-  const Config copy = config.Copy();  // a copy, because a query marks keys as read
-  const auto source = copy.root().is_map() ? copy.root().Find("source") : std::nullopt;
-  const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
-  return path && path->kind() == Node::Kind::kScalar ? path->Text() : "";
-}
-
 /// Returns a JSON entry for each file that a source reads from `path`.
 std::vector<std::string> DataEntriesAt(const std::string& path) {
   std::error_code error;
@@ -91,12 +83,13 @@ std::vector<std::string> DataEntriesAt(const std::string& path) {
 /// several configs contain has only one entry.
 std::vector<std::string> DataEntriesOf(const std::vector<Config>& configs) {
   std::vector<std::string> data;
-  std::set<std::string> visited_paths = {""};
+  std::set<std::string> visited_paths;
   for (const Config& config : configs) {
-    const std::string path = SourcePath(config);
-    if (!visited_paths.insert(path).second) continue;
-    const std::vector<std::string> entries = DataEntriesAt(path);
-    data.insert(data.end(), entries.begin(), entries.end());
+    for (const std::string& path : DataPaths(config.root().tree())) {
+      if (!visited_paths.insert(path).second) continue;
+      const std::vector<std::string> entries = DataEntriesAt(path);
+      data.insert(data.end(), entries.begin(), entries.end());
+    }
   }
   return data;
 }

@@ -6,19 +6,23 @@
 #include <optional>
 #include <system_error>
 
+#include "alidade/config/data_paths.h"
+
 namespace alidade::internal {
 
 void CheckReadableAgain(const Config& config, const char* reader) {
-  const Config copy = config.Copy();
-  const auto source = copy.root().Find("source");
-  const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
-  if (!path || path->kind() != Node::Kind::kScalar) return;
-  std::error_code error;
-  const auto status = std::filesystem::status(config.folder() / path->Text(), error);
-  const bool is_reopenable =
-      !std::filesystem::exists(status) || is_regular_file(status) || is_directory(status);
-  if (path->Text() != "-" && is_reopenable) return;
-  path->Fail("'" + path->Text() + "' can be read only once, but " + reader, "a regular file");
+  for (const std::string& path : DataPaths(config.root().tree())) {
+    std::error_code error;
+    const auto status = std::filesystem::status(config.folder() / path, error);
+    const bool is_reopenable =
+        !std::filesystem::exists(status) || is_regular_file(status) || is_directory(status);
+    if (path != "-" && is_reopenable) continue;
+    const Config copy = config.Copy();
+    const Node source = copy.root().At("source");
+    const std::optional<Node> files = source.Find("files");
+    (files ? *files : source.At("path"))
+        .Fail("'" + path + "' can be read only once, but " + reader, "a regular file");
+  }
 }
 
 namespace {

@@ -7,10 +7,11 @@
 #include <fstream>
 #include <functional>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <vector>
 
-#include "plugins/csv/csv.h"
+#include "plugins/tables/tables.h"
 #include "support/temporary_folder.h"
 
 namespace alidade::testing {
@@ -23,10 +24,13 @@ inline constexpr const char* kDepthConfig =
 inline constexpr const char* kHeader = "t_s,disparity_px,scale,reference_depth_m\n";
 
 /// Test in a temporary folder, which contains `a.csv`.
-class Csv : public ::testing::Test {
+class Tables : public ::testing::Test {
  protected:
   fs::path File() const { return folder_ / "a.csv"; }
-  void Write(const std::string& text) const { std::ofstream(File(), std::ios::binary) << text; }
+  void Write(const std::string& text) const { Write("a.csv", text); }
+  void Write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+  }
 
   /// Opens the source of `config`, which contains the keys of the `source` map.
   std::unique_ptr<Source> Open(const std::string& config = kDepthConfig) {
@@ -36,7 +40,7 @@ class Csv : public ::testing::Test {
   std::unique_ptr<Source> OpenConfig() {
     static const AlidadeHost kHost{};
     Params params(&kHost);
-    auto source = CreateCsv({config_->root(), params, 1, folder_.path(), any_order_});
+    auto source = CreateTables({config_->root(), params, 1, folder_.path(), any_order_});
     config_->root().RejectUnread();
     return source;
   }
@@ -78,6 +82,28 @@ class Csv : public ::testing::Test {
   bool any_order_ = false;  ///< true if `out_of_sequence.policy` allows any order
   std::unique_ptr<Config> config_;
 };
+
+/// Returns the frames in short, such as `100 s0=1,2 s1=3 t0=4`: the time in ms, the values of each
+/// measurement with the index of its stream, and the true values.
+inline std::vector<std::string> Shown(const std::vector<SourceFrame>& frames) {
+  const auto list = [](const std::vector<double>& values) {
+    std::ostringstream text;
+    for (std::size_t i = 0; i < values.size(); ++i) text << (i > 0 ? "," : "") << values[i];
+    return text.str();
+  };
+  std::vector<std::string> shown;
+  for (const SourceFrame& frame : frames) {
+    std::string& text = shown.emplace_back(std::to_string(frame.timestamp / 1'000'000));
+    for (const Measurement& m : frame.measurements) {
+      text += " s" + std::to_string(m.stream) + '=' + list(m.values);
+      EXPECT_EQ(m.timestamp, frame.timestamp);
+    }
+    for (std::size_t i = 0; i < frame.truth.size(); ++i) {
+      if (!frame.truth[i].empty()) text += " t" + std::to_string(i) + '=' + list(frame.truth[i]);
+    }
+  }
+  return shown;
+}
 
 inline std::vector<Timestamp> Timestamps(const std::vector<SourceFrame>& frames) {
   std::vector<Timestamp> timestamps;

@@ -16,7 +16,7 @@ namespace alidade {
 ///   in the comment          unit  key that models use
 ///   focal_px= or fx_px=     px    focal_px, camera.fx
 ///   baseline_m=             m     baseline_m, camera.baseline_m
-class CsvCalibration {
+class TableCalibration {
  public:
   /// Records the numbers in a comment that begins in column 1 of `line`.
   void Record(std::string_view comment, const std::string& file, int line);

@@ -3,7 +3,7 @@
 // Tests tables and configs with a fault. The comment above a test contains the number of the fault.
 #include <algorithm>
 
-#include "csv_fixture.h"
+#include "tables_fixture.h"
 
 namespace alidade::testing {
 namespace {
@@ -11,14 +11,14 @@ namespace {
 // ---- bad data -----------------------------------------------------------------------------------
 
 // Tests fault 27 of tests/faults/README.md.
-TEST_F(Csv, WrongNumberOfColumns) {
+TEST_F(Tables, WrongNumberOfColumns) {
   ExpectBadData(std::string("# c\n") + kHeader + "0,1,2,3\n1,2,3\n",
                 "FILE:4:6: the line has 3 columns; expected 4 columns, as in line 2");
   ExpectBadData(std::string(kHeader) + "0,1,2,3,4\n",
                 "FILE:2:9: the line has 5 columns; expected 4 columns, as in line 1");
 }
 
-TEST_F(Csv, BytesThatAreNoText) {
+TEST_F(Tables, BytesThatAreNoText) {
   const std::string expected =
       "FILE:1:1: this is not a text file; expected a table as text; to read a compressed table, "
       "use a pipe: zcat FILE | alidade run CONFIG --set source.path=-";
@@ -27,40 +27,40 @@ TEST_F(Csv, BytesThatAreNoText) {
 }
 
 // Tests fault 34 of tests/faults/README.md.
-TEST_F(Csv, TruncatedLastLine) {
+TEST_F(Tables, TruncatedLastLine) {
   ExpectBadData(
       std::string(kHeader) + "0,1,2,3\n1,2",
       "FILE:3:4: the last line is cut short: it has 2 columns; expected 4 columns, as in line 1");
 }
 
 // Tests fault 28 of tests/faults/README.md.
-TEST_F(Csv, NotANumber) {
+TEST_F(Tables, NotANumber) {
   const auto expect = [&](const std::string& cell, const std::string& hint) {
     ExpectBadData(
         std::string(kHeader) + "0, " + cell + ",2,3\n",
         "FILE:2:3 disparity_px: '" + cell + "' is not a number; expected a finite number" + hint);
   };
   // A word may mark a missing value. A cell with a digit cannot.
-  expect("abc", ", or 'source.missing: [\"\", abc]'");
-  expect("+", ", or 'source.missing: [\"\", \"+\"]'");
+  expect("abc", ", or 'missing: [abc]'");
+  expect("+", ", or 'missing: [\"+\"]'");
   for (const char* cell : {"6.5x", "0x10", "1.5.2", "+-1", "--1", "1e", "1 2"}) expect(cell, "");
 }
 
-TEST_F(Csv, ShowsHostileCellsHarmlessly) {
+TEST_F(Tables, ShowsHostileCellsHarmlessly) {
   ExpectBadData(std::string(kHeader) + "0,\x1b[31m" + std::string(50, 'y') + ",2,3\n",
                 "FILE:2:3 disparity_px: '?[31m" + std::string(35, 'y') +
                     "...' is not a number; expected a finite number");
   ExpectBadData(std::string(kHeader) + "0," + std::string(1, '\0') + ",2,3\n",
                 "FILE:2:3 disparity_px: '?' is not a number; expected a finite number, or "
-                "'source.missing: [\"\", \"?\"]'");
+                "'missing: [\"?\"]'");
 }
 
 // Tests fault 29 of tests/faults/README.md.
-TEST_F(Csv, NotFinite) {
+TEST_F(Tables, NotFinite) {
   for (const std::string cell : {"nan", "inf", "-inf", "NaN", "Infinity"}) {
     ExpectBadData(std::string(kHeader) + "0,1," + cell + ",3\n",
                   "FILE:2:5 scale: '" + cell +
-                      "' is not finite; expected a finite number, or 'source.missing: [\"\", " +
+                      "' is not finite; expected a finite number, or 'missing: [" +
                       (cell == "-inf" ? "\"-inf\"" : cell) + "]'");
   }
   ExpectBadData(std::string(kHeader) + "nan,1,2,3\n",
@@ -68,7 +68,7 @@ TEST_F(Csv, NotFinite) {
 }
 
 // Tests fault 30 of tests/faults/README.md.
-TEST_F(Csv, Overflow) {
+TEST_F(Tables, Overflow) {
   for (const std::string cell : {"1e400", "-1e400", "1e-400"}) {
     ExpectBadData(std::string(kHeader) + "0,1,2," + cell + "\n",
                   "FILE:2:7 reference_depth_m: '" + cell +
@@ -76,13 +76,13 @@ TEST_F(Csv, Overflow) {
   }
 }
 
-TEST_F(Csv, ReciprocalOfZero) {
+TEST_F(Tables, ReciprocalOfZero) {
   ExpectBadData(std::string(kHeader) + "0,1,0,3\n",
                 "FILE:2:5 scale: '0' has no finite reciprocal; expected a finite number");
 }
 
 // Tests fault 33 of tests/faults/README.md.
-TEST_F(Csv, LineTooLong) {
+TEST_F(Tables, LineTooLong) {
   // A row has three cells and a long number. A row of 4096 bytes is accepted, and a longer row is
   // an error. The line end does not count.
   const auto row = [](std::size_t length) { return "0,1,2,3." + std::string(length - 8, '0'); };
@@ -95,7 +95,7 @@ TEST_F(Csv, LineTooLong) {
                 "FILE:2:1: the line is too long; expected at most 4096 bytes per line");
 }
 
-TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
+TEST_F(Tables, LongestLineMayEndAcrossTheBuffer) {
   // The buffer of 65536 bytes ends between the '\r' and the '
   // ' of a line of 4096 bytes. The two characters count as one line end, so the next line has the
   // correct number.
@@ -109,7 +109,7 @@ TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
 }
 
 // Tests faults 35 and 36 of tests/faults/README.md.
-TEST_F(Csv, TimeMustIncrease) {
+TEST_F(Tables, TimeMustIncrease) {
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n# c\n0.1,1,2,3\n",
                 "FILE:5:1 t_s: '0.1' is earlier than in line 3; expected increasing times, or "
                 "'out_of_sequence.policy: buffer' or 'rollback'");
@@ -120,16 +120,16 @@ TEST_F(Csv, TimeMustIncrease) {
       "'out_of_sequence.policy: buffer', which joins rows of different streams");
 }
 
-TEST_F(Csv, TimeBeyondTheTimestamps) {
+TEST_F(Tables, TimeBeyondTheTimestamps) {
   ExpectBadData(std::string(kHeader) + "9.3e9,1,2,3\n",
                 "FILE:2:1 t_s: '9.3e9' is beyond 292 years; expected -9.2e9 s to 9.2e9 s, or "
-                "another unit, such as 'source.time: {unit: ns}'");
+                "another unit, such as 'time: {unit: ns}'");
   ExpectBadData(std::string(kHeader) + ",1,2,3\n",
                 "FILE:2:1 t_s: '' is an empty cell; expected a finite number");
 }
 
 // Tests fault 43 of tests/faults/README.md.
-TEST_F(Csv, NothingAtAll) {
+TEST_F(Tables, NothingAtAll) {
   ExpectBadData("", "FILE: the header line is missing; expected a line that names the columns");
   ExpectBadData("# c\n\n",
                 "FILE: the header line is missing; expected a line that names the columns");
@@ -138,7 +138,7 @@ TEST_F(Csv, NothingAtAll) {
 
 // ---- bad config ---------------------------------------------------------------------------------
 
-TEST_F(Csv, UnknownColumn) {
+TEST_F(Tables, UnknownColumn) {
   Write(std::string(kHeader) + "0,1,2,3\n");
   ExpectBadConfig("path: a.csv\nstreams: {d: [disparity_pc]}\n",
                   "run.yaml:2:15 streams.d[0]: there is no column 'disparity_pc' in FILE; expected "
@@ -149,26 +149,14 @@ TEST_F(Csv, UnknownColumn) {
                   "of t_s, disparity_px, scale, reference_depth_m");
 }
 
-TEST_F(Csv, AnotherSeparatorIsNamed) {
-  const auto expect = [&](const std::string& separator, const std::string& words) {
-    Write("t_s" + separator + "z\n0" + separator + "1\n");
-    ExpectBadConfig("path: a.csv\nstreams: {z: z}\n",
-                    "run.yaml:1:1: there is no column 't_s' in FILE; expected one of t_s" + words);
-  };
-  expect(";", ";z, or 'source.separator: \";\"'");
-  expect("\t", "?z, or 'source.separator: \"\\t\"'");
-  expect(" | ", " | z, or 'source.separator: \"|\"'");
-  expect(" ", " z, or 'source.separator: \" \"'");
-}
-
-TEST_F(Csv, MissingIsTheTextOfACell) {
+TEST_F(Tables, MissingIsTheTextOfACell) {
   Write("t_s,z\n0,1\n");
   ExpectBadConfig("path: a.csv\nmissing: .nan\nstreams: {z: z}\n",
                   "run.yaml:2:10 missing: '.nan' cannot be the text of a cell; expected the text "
                   "that the table contains; did you mean 'nan'?");
 }
 
-TEST_F(Csv, ShowsHostileColumnNamesHarmlessly) {
+TEST_F(Tables, ShowsHostileColumnNamesHarmlessly) {
   Write("t_s,disp\x1b[31marity," + std::string(50, 'y') + "\n0,1,2\n");
   ExpectBadConfig("path: a.csv\nstreams: {d: 'disp[31marity'}\n",
                   "run.yaml:2:14 streams.d: there is no column 'disp[31marity' in FILE; expected "
@@ -176,14 +164,14 @@ TEST_F(Csv, ShowsHostileColumnNamesHarmlessly) {
                       std::string(40, 'y') + "...; did you mean 'disp?[31marity'?");
 }
 
-TEST_F(Csv, ColumnNamedTwice) {
+TEST_F(Tables, ColumnNamedTwice) {
   Write("t_s,z,z\n0,1,2\n");
   ExpectBadConfig("path: a.csv\nstreams: {z: z}\n",
                   "run.yaml:2:14 streams.z: FILE has two columns 'z'; expected one column with "
                   "this name");
 }
 
-TEST_F(Csv, UnknownAndMissingKeys) {
+TEST_F(Tables, UnknownAndMissingKeys) {
   Write(std::string(kHeader) + "0,1,2,3\n");
   ExpectBadConfig("path: a.csv\nstreams: {d: {columns: scale, recipocal: true}}\n",
                   "run.yaml:2:31 streams.d.recipocal: unknown key; did you mean 'reciprocal'?");
@@ -192,17 +180,17 @@ TEST_F(Csv, UnknownAndMissingKeys) {
   ExpectBadConfig("path: a.csv\nstreams: {}\n",
                   "run.yaml:2:10 streams: the map is empty; expected a map such as 'disparity: "
                   "disparity_px'");
-  ExpectBadConfig("streams: {d: scale}\n", "run.yaml:1:1 path: missing key, needed by csv");
+  ExpectBadConfig("streams: {d: scale}\n", "run.yaml:1:1 path: missing key, needed by tables");
 }
 
-TEST_F(Csv, GainOfNothing) {
+TEST_F(Tables, GainOfNothing) {
   Write("t_s,z\n0,1\n");
   ExpectBadConfig("path: a.csv\nstreams: {z: {columns: z, gain: 0}}\n",
                   "run.yaml:2:33 streams.z.gain: a gain of 0 sets all values to 0; expected a "
                   "number other than 0");
 }
 
-TEST_F(Csv, TimeAndRateExcludeEachOther) {
+TEST_F(Tables, TimeAndRateExcludeEachOther) {
   ExpectBadConfig("path: a.csv\ntime: {column: t_s}\nrate_hz: 30\nstreams: {d: scale}\n",
                   "run.yaml:3:10 rate_hz: 'time' and 'rate_hz' are both given; expected only "
                   "one of these keys");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "csv_calibration.h"
+#include "table_calibration.h"
 
 #include <algorithm>
 
@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-void CsvCalibration::Record(std::string_view comment, const std::string& file, int line) {
+void TableCalibration::Record(std::string_view comment, const std::string& file, int line) {
   constexpr std::string_view kSeparators = " \t,;()";
   for (std::size_t offset = 0; offset < comment.size();) {
     const std::size_t end = std::min(comment.find_first_of(kSeparators, offset), comment.size());
@@ -24,7 +24,7 @@ void CsvCalibration::Record(std::string_view comment, const std::string& file, i
   }
 }
 
-std::optional<Config> CsvCalibration::Get() const {
+std::optional<Config> TableCalibration::Get() const {
   if (entries_.empty()) return std::nullopt;
   Config config = Config::FromText("calibration: {}", "the comments of a table");
   for (const Entry& entry : entries_) {
@@ -48,8 +48,8 @@ std::optional<Config> CsvCalibration::Get() const {
   return config;
 }
 
-void CsvCalibration::Fail(const Entry& entry, const std::string& problem,
-                          std::string_view expected) {
+void TableCalibration::Fail(const Entry& entry, const std::string& problem,
+                            std::string_view expected) {
   throw Error(ExitCode::kBadData, ErrorLine(entry.place, entry.key, problem, expected));
 }
 

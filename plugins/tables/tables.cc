@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tables.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "field_values.h"
+#include "local_frame.h"
+#include "table_calibration.h"
+#include "table_layout.h"
+#include "table_reader.h"
+
+namespace alidade {
+namespace {
+
+std::optional<GeodeticPosition> ReadOrigin(const Node& entry) {
+  const std::optional<Node> node = entry.Find("origin");
+  if (!node) return std::nullopt;
+  GeodeticPosition origin;
+  origin.latitude_deg = node->At("latitude_deg").Number(-90.0, 90.0, false, false, "deg");
+  origin.longitude_deg = node->At("longitude_deg").Number(-360.0, 360.0, false, false, "deg");
+  if (const auto height = node->Find("height_m")) origin.height_m = height->Number();
+  node->RejectUnread();
+  return origin;
+}
+
+std::filesystem::path ReadPath(const Node& node, const std::filesystem::path& folder) {
+  const std::filesystem::path path = node.Text();
+  if (path.empty()) node.Fail("the path is empty", "a file, or '-' for standard input");
+  return path == "-" ? path : folder / path;
+}
+
+class TablesSource : public Source {
+ public:
+  explicit TablesSource(const SourceArguments& arguments)
+      : any_order_(arguments.any_order), local_frame_(ReadOrigin(arguments.entry)) {
+    const std::optional<Node> files = arguments.entry.Find("files");
+    if (!files) {
+      AddTable(arguments.entry, arguments.folder);
+      return;
+    }
+    std::filesystem::path folder = arguments.folder;
+    if (const auto path = arguments.entry.Find("path")) folder = ReadPath(*path, folder);
+    for (const Node& file : files->Items()) {
+      file.ExpectMap("{path: gps.csv, streams: {gps: [x, y]}}");
+      AddTable(file, folder);
+      file.RejectUnread();
+    }
+  }
+
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const std::vector<StreamInfo>& truths() const override { return truths_; }
+  std::int64_t size() const override {
+    return tables_.size() == 1 ? tables_.front().reader->size() : -1;
+  }
+  Place place() const override { return place_; }
+  std::optional<Config> Calibration() const override { return calibration_.Get(); }
+
+  bool Next(SourceFrame& frame) override {
+    while (!HasCompleteFrame()) {
+      if (!ReadRows() && frames_.empty()) return false;
+    }
+    frame = std::move(frames_.front().frame);
+    std::ranges::stable_sort(frame.measurements, {}, &Measurement::stream);
+    place_ = std::move(frames_.front().place);
+    frames_.pop_front();
+    return true;
+  }
+
+ private:
+  struct Table {
+    std::unique_ptr<TableReader> reader;
+    /// Index of the first stream and truth of the table in the lists of the source.
+    std::size_t first_stream, first_truth;
+  };
+  struct PendingFrame {
+    SourceFrame frame;
+    Place place;  ///< place of the last row of the frame
+  };
+
+  void AddTable(const Node& entry, const std::filesystem::path& folder) {
+    TableLayout layout = ReadTableLayout(entry);
+    const Node path = entry.At("path", "tables");
+    const auto is_standard_input = [](const Table& table) {
+      return table.reader->name() == "<stdin>";
+    };
+    if (path.Text() == "-" && std::ranges::any_of(tables_, is_standard_input)) {
+      path.Fail("an earlier file is already read from standard input", "a file or a named pipe");
+    }
+    tables_.push_back({nullptr, streams_.size(), truths_.size()});
+    AddNames(layout.streams, entry, streams_);
+    AddNames(layout.truths, entry, truths_);
+    tables_.back().reader = std::make_unique<TableReader>(std::move(layout), ReadPath(path, folder),
+                                                          path, any_order_, calibration_);
+  }
+
+  static void AddNames(const std::vector<TableField>& fields, const Node& entry,
+                       std::vector<StreamInfo>& infos) {
+    for (const TableField& field : fields) {
+      if (std::ranges::find(infos, field.info.name, &StreamInfo::name) != infos.end()) {
+        entry.Fail("'" + field.info.name + "' is also in an earlier file",
+                   "each stream and each truth in one file");
+      }
+      infos.push_back(field.info);
+    }
+  }
+
+  /// Returns true if the first frame can be returned: if no later row can add to it or precede it.
+  bool HasCompleteFrame() const {
+    if (frames_.empty()) return false;
+    if (any_order_) return true;
+    const Timestamp timestamp = frames_.front().frame.timestamp;
+    return std::ranges::all_of(
+        tables_, [&](const Table& table) { return table.reader->EarliestNext() > timestamp; });
+  }
+
+  /// Adds the earliest rows to the frames: all rows with the time of the first one. Returns false
+  /// at the end of all tables.
+  bool ReadRows() {
+    const TableReader* first = nullptr;
+    for (const Table& table : tables_) {
+      TableReader& reader = *table.reader;
+      if (!reader.has_row() && (reader.is_at_end() || !reader.Read())) continue;
+      if (first == nullptr || reader.timestamp() < first->timestamp()) first = &reader;
+    }
+    if (first == nullptr) return false;
+    const Timestamp timestamp = first->timestamp();
+    for (const Table& table : tables_) {
+      TableReader& reader = *table.reader;
+      while (reader.has_row() && reader.timestamp() == timestamp) {
+        AddRow(table);
+        reader.ReleaseRow();
+        if (reader.layout().time.repeats) reader.Read();
+      }
+    }
+    return true;
+  }
+
+  void AddRow(const Table& table) {
+    const TableReader& reader = *table.reader;
+    const TableLayout& layout = reader.layout();
+    for (std::size_t i = 0; i < layout.streams.size(); ++i) {
+      const TableField& field = layout.streams[i];
+      if (!IsSelected(reader.row(), field)) continue;
+      SourceFrame& frame = FrameAt(reader.timestamp() - field.delay, reader);
+      Measurement measurement;
+      if (!ReadMeasurement(reader.row(), field, local_frame_, measurement)) continue;
+      if (field.goes_blind && reader.is_blind()) continue;
+      measurement.timestamp = frame.timestamp;
+      measurement.stream = static_cast<int>(table.first_stream + i);
+      frame.measurements.push_back(std::move(measurement));
+    }
+    for (std::size_t i = 0; i < layout.truths.size(); ++i) {
+      const TableField& field = layout.truths[i];
+      if (!IsSelected(reader.row(), field)) continue;
+      std::vector<double>& truth = FrameAt(reader.timestamp(), reader).truth[table.first_truth + i];
+      if (truth.empty()) ReadValues(reader.row(), field, local_frame_, truth);
+    }
+  }
+
+  /// Returns the pending frame at `timestamp`, to which the row of `reader` adds.
+  SourceFrame& FrameAt(Timestamp timestamp, const TableReader& reader) {
+    const auto time_of = [](const PendingFrame& pending) { return pending.frame.timestamp; };
+    auto found = std::ranges::lower_bound(frames_, timestamp, {}, time_of);
+    if (found == frames_.end() || found->frame.timestamp != timestamp) {
+      found = frames_.insert(found, PendingFrame());
+      found->frame.timestamp = timestamp;
+      found->frame.truth.resize(truths_.size());
+    }
+    found->place = {reader.name(), reader.row().number(), 0};
+    return found->frame;
+  }
+
+  bool any_order_;
+  LocalFrame local_frame_;
+  TableCalibration calibration_;
+  std::vector<StreamInfo> streams_, truths_;
+  std::vector<Table> tables_;
+  std::deque<PendingFrame> frames_;  ///< in the order of time
+  Place place_;
+};
+
+}  // namespace
+
+std::unique_ptr<Source> CreateTables(const SourceArguments& arguments) {
+  return std::make_unique<TablesSource>(arguments);
+}
+
+}  // namespace alidade

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <span>
 #include <utility>
@@ -496,14 +497,28 @@ SharedSensor CreateFormula(const Node& entry, const Node& roles, const Problem& 
   return internal::CreateFormulaSensor(entry, bound_roles, has_landmark);
 }
 
+/// Returns the geometry of the block that each role of `roles` is bound to. Omits roles whose block
+/// does not exist, which ReadRole rejects, and those of landmarks.
+std::map<std::string, std::string> BoundGeometries(const Node& roles, const Problem& problem) {
+  std::map<std::string, std::string> geometries;
+  for (const auto& [role, node] : roles.Entries()) {
+    const std::optional<Node> block = node.is_map() ? node.Find("block") : node;
+    const BlockId id = block ? problem.layout.Find(block->Text()) : -1;
+    if (id >= 0) geometries[role] = ToString(problem.layout[id].geometry());
+  }
+  return geometries;
+}
+
 void ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
                 Problem& problem) {
   const std::string model_name = entry.At("model", "a sensor entry").Text();
   SensorOptions options{.stream = entry.At("stream", "sensor '" + name + "'").Text()};
   const Node roles = entry.At("roles", "sensor '" + name + "'", "roles: {ROLE: ENTRY.BLOCK}");
   roles.ExpectMap("{ROLE: ENTRY.BLOCK}");
-  const SharedSensor model = model_name == kFormula ? CreateFormula(entry, roles, problem)
-                                                    : host.CreateSensor(model_name, entry);
+  const SharedSensor model =
+      model_name == kFormula
+          ? CreateFormula(entry, roles, problem)
+          : host.CreateSensor(model_name, entry, {}, BoundGeometries(roles, problem));
   if (const auto loss = entry.Find("loss")) options.loss = ReadLoss(*loss);
   for (const Space& role : model->roles()) roles.Declare(role.landmark() ? "landmark" : role.name);
   roles.RejectUnread();

@@ -127,11 +127,13 @@ std::vector<ParamInfo> ListedKeys(const std::string& keys) {
 
 }  // namespace
 
-std::shared_ptr<const ModelInstance> CreateModel(const PluginEntry& entry, const Node& node,
-                                                 const std::string& representation) {
+std::shared_ptr<const ModelInstance> CreateModel(
+    const PluginEntry& entry, const Node& node, const std::string& representation,
+    const std::map<std::string, std::string>& bound_geometries) {
   ALIDADE_EXPECTS(entry.is_model());
   const std::optional<Node> covariance = internal::FindNoiseCovariance(node, entry.model.kind);
-  ParamReader reader(node, QuotedName(entry), representation, covariance.has_value());
+  ParamReader reader(node, QuotedName(entry), representation, covariance.has_value(),
+                     bound_geometries);
   NewInstance instance(entry);
   std::int32_t code;
   {

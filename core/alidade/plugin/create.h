@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,9 +17,11 @@ namespace alidade {
 
 /// Creates a model from its config entry `node`. Does not reject unread keys; the caller must call
 /// Node::RejectUnread. If `representation` is not "", it replaces the parameter
-/// `landmarks.representation` of a sensor that offers this choice. Errors: kPlugin, kBadConfig.
-std::shared_ptr<const ModelInstance> CreateModel(const PluginEntry& entry, const Node& node,
-                                                 const std::string& representation = {});
+/// `landmarks.representation` of a sensor that offers this choice. `bound_geometries` are the
+/// geometries of the blocks that are bound to the roles of a sensor. Errors: kPlugin, kBadConfig.
+std::shared_ptr<const ModelInstance> CreateModel(
+    const PluginEntry& entry, const Node& node, const std::string& representation = {},
+    const std::map<std::string, std::string>& bound_geometries = {});
 /// Returns the parameters that a model reads. To find the parameters, this function creates the
 /// model with placeholder values, once for each value of each choice.
 std::vector<ParamInfo> ModelSchema(const PluginEntry& entry);

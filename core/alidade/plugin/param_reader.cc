@@ -63,7 +63,7 @@ bool HasFallback(const AlidadeParam& param) {
 bool IsNoise(const AlidadeParam& param) {
   const std::string_view key = param.key;
   return param.kind == ALIDADE_PARAM_NUMBER &&
-         (key.starts_with("sigma_") || key.starts_with("noise."));
+         (key == "sigma" || key.starts_with("sigma_") || key.starts_with("noise."));
 }
 
 /// Returns placeholder values: the default of the parameter or, without a default, values within
@@ -88,7 +88,9 @@ bool IsText(const AlidadeParam& param) { return param.kind == ALIDADE_PARAM_TEXT
 
 std::string FallbackText(const AlidadeParam& param) {
   if (IsText(param)) return Text(param.fallback_text);
-  return HasFallback(param) ? ValuesText(param, Fallback(param)) : "";
+  if (!HasFallback(param)) return "";
+  const std::vector<double> values = Fallback(param);
+  return !values.empty() && values[0] == kInfinity ? "none" : ValuesText(param, values);
 }
 
 std::vector<std::string> Choices(const AlidadeParam& param) {
@@ -278,11 +280,12 @@ AlidadeHost MakeHost(void* context) {
 }
 
 ParamReader::ParamReader(const Node& entry, std::string owner, std::string representation,
-                         bool has_covariance)
+                         bool has_covariance, std::map<std::string, std::string> bound_geometries)
     : entry_(entry),
       owner_(std::move(owner)),
       representation_(std::move(representation)),
       has_covariance_(has_covariance),
+      bound_geometries_(std::move(bound_geometries)),
       host_(MakeHost(this)) {
   host_.read = &ParamReader::Read;
   host_.read_text = &ParamReader::ReadText;
@@ -410,6 +413,7 @@ std::vector<double> ParamReader::Values(const AlidadeParam& param) const {
 /// Returns the text of a parameter. A calibration does not contain texts.
 std::string ParamReader::TextOf(const AlidadeParam& param) const {
   std::string key = param.key;
+  if (key == "roles") return RolesText();
   Node map = BaseOf(key);
   const std::optional<Node> node = FindBelow(map, key);
   if (!node && HasFallback(param)) return Text(param.fallback_text);
@@ -418,6 +422,22 @@ std::string ParamReader::TextOf(const AlidadeParam& param) const {
   const std::string defect = TextDefect(text.c_str());
   if (!defect.empty()) node->Fail("the text " + defect);
   return text;
+}
+
+/// Returns `ROLE: GEOMETRY, ...` for the roles that the entry binds, in the order of the entry.
+std::string ParamReader::RolesText() const {
+  std::vector<std::string> roles;
+  const std::optional<Node> map = entry_.Find("roles");
+  if (!map || !map->is_map()) return {};
+  for (const auto& [name, node] : map->Entries()) {
+    const auto bound = bound_geometries_.find(name);
+    if (bound != bound_geometries_.end()) {
+      roles.push_back(name + ": " + bound->second);
+    } else if (!node.is_map()) {
+      roles.push_back(name + ": " + node.Text());
+    }
+  }
+  return Join(roles);
 }
 
 std::optional<Node> ParamReader::InCalibration(const std::string& key) const {
@@ -508,7 +528,7 @@ std::int32_t ParamRecorder::ReadText(void* context, const AlidadeParam* source, 
   auto* recorder = static_cast<ParamRecorder*>(context);
   try {
     const AlidadeParam param = CheckParam(source, text, capacity);
-    recorder->Record(param, 0);
+    if (Text(param.key) != "roles") recorder->Record(param, 0);
     return CopyText(Text(param.fallback_text), text);
   } catch (const std::bad_alloc&) {
     recorder->out_of_memory_ = true;

@@ -3,6 +3,7 @@
 
 #include <exception>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <unordered_set>
@@ -35,9 +36,11 @@ class ParamReader {
   /// is one of the choices of `landmarks.representation`, it replaces the value of this key.
   /// `has_covariance` is true if the entry contains a covariance instead of the model's noise. The
   /// model's parameters `sigma_*` and `noise.*` then have placeholder values, and the entry must
-  /// not contain these keys.
+  /// not contain these keys. `bound_geometries` are the geometries of the blocks that are bound to
+  /// roles of a sensor, for the parameter `roles` (BoundRoles in alidade/model/bound_roles.h).
   ParamReader(const Node& entry, std::string owner, std::string representation = {},
-              bool has_covariance = false);
+              bool has_covariance = false,
+              std::map<std::string, std::string> bound_geometries = {});
   ParamReader(const ParamReader&) = delete;
   ParamReader& operator=(const ParamReader&) = delete;
 
@@ -60,6 +63,7 @@ class ParamReader {
   Node BaseOf(const std::string& key) const;
   std::vector<double> Values(const AlidadeParam& param) const;
   std::string TextOf(const AlidadeParam& param) const;
+  std::string RolesText() const;
   std::optional<Node> InCalibration(const std::string& key) const;
   void ExpectCalibrated(const AlidadeParam& param, const Node& node,
                         const std::vector<double>& values) const;
@@ -71,6 +75,7 @@ class ParamReader {
   Node entry_;
   std::string owner_, representation_;
   bool has_covariance_;
+  std::map<std::string, std::string> bound_geometries_;
   ExitCode code_ = ExitCode::kBadConfig;  ///< exit code of `errors_`
   AlidadeHost host_{};
   std::unordered_set<std::string> keys_;  ///< all requested keys

@@ -213,10 +213,11 @@ void PluginHost::FailMissing(const std::string& kind, const std::string& name,
               ErrorLine(location.place(), location.path(), problem, expected, nearest) + places);
 }
 
-SharedSensor PluginHost::CreateSensor(const std::string& name, const Node& entry,
-                                      const std::string& representation) const {
+SharedSensor PluginHost::CreateSensor(
+    const std::string& name, const Node& entry, const std::string& representation,
+    const std::map<std::string, std::string>& bound_geometries) const {
   return std::make_shared<PluginSensor>(
-      CreateModel(Find(kSensorKind, name, entry), entry, representation));
+      CreateModel(Find(kSensorKind, name, entry), entry, representation, bound_geometries));
 }
 
 SharedMotion PluginHost::CreateMotion(const std::string& name, const Node& entry) const {

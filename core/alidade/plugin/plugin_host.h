@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -73,7 +74,8 @@ class PluginHost {
 
   /// Creates the model `name` by CreateModel. Errors: the errors of Find and CreateModel.
   SharedSensor CreateSensor(const std::string& name, const Node& entry,
-                            const std::string& representation = {}) const;
+                            const std::string& representation = {},
+                            const std::map<std::string, std::string>& bound_geometries = {}) const;
   SharedMotion CreateMotion(const std::string& name, const Node& entry) const;
   /// Returns the only entry with this kind and name. `node` is the node of the config that requests
   /// the entry. Errors: kPlugin if no plugin or more than one plugin offers such an entry;

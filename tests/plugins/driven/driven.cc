@@ -7,7 +7,7 @@ namespace {
 
 /// Sensor z = x + n, n ~ N(0, sigma^2).
 struct Fix : alidade::Sensor<alidade::Vec<1>, alidade::Vec<1>> {
-  static constexpr std::array kRoles{alidade::Quantity{"position", "m"}};
+  static constexpr std::array kRoles{alidade::Quantity{"position"}};
   static constexpr alidade::Quantity kMeasurement{"fix", "m"};
   double sigma_m;
   explicit Fix(alidade::Params& p)

@@ -216,7 +216,8 @@ void AddBundle(CLI::App& program, Action& action) {
       "relative change of the cost per step below which the solver has converged; default 1e-8")
       ->check(IsNumber(0.0, 1.0));
   CLI::Option* const camera = add("--camera", arguments->tracks.camera, "FILE",
-                                  "for tracks: YAML file that contains `camera`");
+                                  "for tracks: calibration file of alidade, Kalibr, OpenCV, ROS, "
+                                  "EuRoC, ORB-SLAM or VINS");
   CLI::Option* const start = add("--start", arguments->tracks.start, "FILE",
                                  "for tracks: file of the initial trajectory (TUM)");
   camera->needs(start);

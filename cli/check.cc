@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "alidade/experiment/calibration.h"
 #include "command.h"
 #include "console.h"
 
@@ -139,7 +140,7 @@ ExitCode Check(const CheckArguments& arguments) {
   std::vector<fs::path> places;
   if (IsFile(arguments.plugin)) places = Absolute({arguments.plugin});
   if (!arguments.config.empty()) {
-    config = Config::FromFile(arguments.config);
+    config = internal::WithCameraFiles(Config::FromFile(arguments.config));
     for (const fs::path& path : PluginPaths(*config)) places.push_back(fs::absolute(path));
   }
   for (const fs::path& path : Absolute(arguments.plugin_paths)) places.push_back(path);

@@ -7,6 +7,7 @@
 #include <new>
 #include <set>
 
+#include "alidade/experiment/calibration.h"
 #include "alidade/io/output_folder.h"
 #include "alidade/plugin/plugin_folders.h"
 #include "command.h"
@@ -130,7 +131,7 @@ Config Input::Load() const {
     const std::size_t equals = set.find('=');
     loaded.Set(set.substr(0, equals), set.substr(equals + 1), "--set");
   }
-  return loaded;
+  return internal::WithCameraFiles(loaded);
 }
 
 std::vector<fs::path> Absolute(const std::vector<std::string>& paths) {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "alidade/experiment/calibration_file.h"
 #include "alidade/model/geometry.h"
 #include "feature_rows.h"
-#include "plugins/common/calibration_file.h"
 #include "plugins/common/companion_files.h"
 #include "tracks_options.h"
 

@@ -181,6 +181,79 @@ TEST_F(CalibrationCli, TheFileBesideTracksTellsTheCamera) {
   }
 }
 
+/// Two cameras in the form of Kalibr. The second is the camera of the tracks.
+constexpr const char* kChain = R"(cam0:
+  camera_model: pinhole
+  intrinsics: [300, 300, 320, 240]
+  distortion_model: none
+  distortion_coeffs: []
+  resolution: [640, 480]
+cam1:
+  camera_model: pinhole
+  intrinsics: [500, 510, 320, 240]
+  distortion_model: none
+  distortion_coeffs: []
+  resolution: [640, 480]
+)";
+
+TEST_F(CalibrationCli, ACameraMayNameAFile) {
+  const std::string camera =
+      "camera: {width: 640, height: 480, fx: 500, fy: 510, cx: 320, cy: 240, baseline_m: 0.5}\n";
+  WriteTracks("");
+  WriteSlam(camera, "");
+  const std::string written = Estimates("slam.yaml");
+  fs::create_directories(folder_ / "rig");
+  Write("rig/chain.yaml", kChain);
+  WriteSlam("camera: {file: rig/chain.yaml, entry: cam1, baseline_m: 0.5}\n", "");
+  EXPECT_EQ(Estimates("slam.yaml"), written);
+  EXPECT_TRUE(Contains(Read("out/config.resolved.yaml"), "fx: 500"))
+      << "the run folder does not depend on the calibration file";
+  EXPECT_NE(Estimates("slam.yaml", "camera.entry=cam0"), written);
+  EXPECT_EQ(Estimates("slam.yaml",
+                      "camera={file: rig/chain.yaml, fx: 500, fy: 510, "
+                      "baseline_m: 0.5}"),
+            written)
+      << "the keys of the config precede those of the file";
+  WriteSlam("", "    camera: {file: rig/chain.yaml, entry: cam1, baseline_m: 0.5}\n");
+  EXPECT_EQ(Estimates("slam.yaml"), written);
+  // A file that an included file names is relative to the included file.
+  Write("rig/camera.yaml", "camera: {file: chain.yaml, entry: cam1, baseline_m: 0.5}\n");
+  WriteSlam("include: rig/camera.yaml\n", "");
+  EXPECT_EQ(Estimates("slam.yaml"), written);
+}
+
+TEST_F(CalibrationCli, ACameraFileThatCannotBeUsedIsRefused) {
+  WriteTracks("");
+  WriteSlam("camera: {file: chain.yaml, baseline_m: 0.5}\n", "");
+  const Outcome missing = Run("slam.yaml");
+  EXPECT_EQ(missing.code, 66);
+  EXPECT_TRUE(Contains(missing.err, "chain.yaml: No such file")) << missing.err;
+  std::string omni = kChain;
+  Write("chain.yaml", omni.replace(omni.find("pinhole"), 7, "omni"));
+  const Outcome other = Run("slam.yaml");
+  EXPECT_EQ(other.code, 65);
+  EXPECT_TRUE(Contains(other.err,
+                       "chain.yaml:2:17 cam0.camera_model: camera model 'omni' is not supported; "
+                       "expected pinhole\n"))
+      << other.err;
+}
+
+TEST_F(CalibrationCli, SimulateReadsACameraFile) {
+  Write("chain.yaml", kChain);
+  Write("scene.yaml", R"(alidade: 1
+camera: {file: chain.yaml}
+source:
+  type: scene
+  max_frames: 3
+  points: {box: {min: [-2, -1.5, 3], max: [2, 1.5, 6]}, count: 9}
+  trajectory: {look_at: [{position: [-0.5, 0, 0], target: [0, 0, 4]},
+                         {position: [0.5, 0, 0], target: [0, 0, 4]}]}
+)");
+  const Outcome outcome = Call({"simulate", "scene.yaml", "-o", "data"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(Contains(Read("data/calibration.yaml"), "fx: 300")) << Read("data/calibration.yaml");
+}
+
 TEST_F(CalibrationCli, ExplainShowsWhatTheDataTell) {
   WriteTracks(kDrive);
   WriteSlam("", "");
@@ -226,7 +299,8 @@ TEST_F(CalibrationCli, ACalibrationThatIsNotUnderstoodIsRefused) {
   EXPECT_EQ(other.code, 65);
   EXPECT_TRUE(Contains(other.err,
                        "the file contains no calibration of a camera; expected 'camera', "
-                       "'intrinsics_px', or a file of OpenCV, ROS, Kalibr or EuRoC"))
+                       "'intrinsics_px', or a file of Kalibr, OpenCV, ROS (camera_info), EuRoC, "
+                       "ORB-SLAM or VINS (camodocal)"))
       << other.err;
 }
 

@@ -192,6 +192,47 @@ TEST_F(BundleTracksCli, PlacesAPointThatHasAPixelWithoutARay) {
       << "the depth is 0.3 m / 0.1, because 0.1 (1 - 0.4 0.01) 300 px = 29.88 px";
 }
 
+/// The camera of kScene in the forms of other programs.
+TEST_F(BundleTracksCli, ReadsCalibrationsOfOtherPrograms) {
+  const Arguments start = {"--max-iterations", "0"};
+  const std::string expected = Bundle("data/tracks.csv", "data/truth.tum", start).out;
+  const std::string matrix = "[525, 0, 320, 0, 525, 240, 0, 0, 1]";
+  for (const std::string& text : {
+           "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: {data: " + matrix +
+               "}\ndistortion_model: plumb_bob\ndistortion_coefficients: {data: []}\n",
+           "height: 480\nwidth: 640\ndistortion_model: rational_polynomial\nd: []\nk: " + matrix +
+               "\n---\n",
+           std::string("camera_model: pinhole\nresolution: [640, 480]\nintrinsics: [525, 525, 320, "
+                       "240]\ndistortion_model: radial-tangential\ndistortion_coefficients: [0, 0, "
+                       "0, 0]\n"),
+           std::string("cam0: {camera_model: pinhole, resolution: [640, 480], intrinsics: "
+                       "[525, 525, 320, 240], distortion_model: none}\nsigma_px: 1\n"),
+           std::string("%YAML:1.0\nmodel_type: PINHOLE\nimage_width: 640\nimage_height: "
+                       "480\ndistortion_parameters: {k1: 0, k2: 0, p1: 0, p2: "
+                       "0}\nprojection_parameters: {fx: 525, fy: 525, cx: 320, cy: 240}\n"),
+           std::string("%YAML:1.0\nCamera.type: \"PinHole\"\nCamera.fx: 525.\nCamera.fy: "
+                       "525.\nCamera.cx: 320.\nCamera.cy: 240.\nCamera.width: 640\nCamera.height: "
+                       "480\nCamera.bf: 40.0\n"),
+           std::string("include: data/calibration.yaml\nsigma_px: 1\n"),
+       }) {
+    Write("other.yaml", text);
+    Arguments all = {"bundle",     "data/tracks.csv", "--camera",
+                     "other.yaml", "--start",         "data/truth.tum"};
+    all.insert(all.end(), start.begin(), start.end());
+    const Outcome made = Call(all);
+    EXPECT_EQ(made.code, 1) << made.err << text;
+    EXPECT_EQ(made.out, expected) << text;
+  }
+  Write("other.yaml", "cam0: {camera_model: omni}\n");
+  const Outcome omni =
+      Call({"bundle", "data/tracks.csv", "--camera", "other.yaml", "--start", "data/truth.tum"});
+  EXPECT_EQ(omni.code, 65);
+  EXPECT_TRUE(Contains(omni.err,
+                       "other.yaml:1:22 cam0.camera_model: camera model 'omni' is not "
+                       "supported; expected pinhole\n"))
+      << omni.err;
+}
+
 TEST_F(BundleTracksCli, CountsFramesWithoutAPose) {
   Write("start.tum", Start(5, 0.0, 0.0));
   const Outcome made = Bundle("data/tracks.csv", "start.tum", {"-o", "out"});

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The input is a camera calibration in the format of this project, OpenCV, ROS, Kalibr or EuRoC.
+// The input is a camera calibration in the format of this project, OpenCV, ROS, Kalibr, EuRoC,
+// ORB-SLAM or VINS.
+#include "alidade/experiment/calibration_file.h"
 #include "fuzz.h"
-#include "plugins/common/calibration_file.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace alidade::fuzz;

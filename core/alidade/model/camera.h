@@ -13,7 +13,7 @@
 namespace alidade {
 
 /// Projection and lens distortion. All models except kPinhole have radial coefficients k.
-enum class CameraModel { kPinhole, kRadtan, kEquidistant, kPhotogrammetric };
+enum class CameraModel { kPinhole, kRadtan, kEquidistant, kPhotogrammetric, kRationalPolynomial };
 
 /// Camera with projection, lens distortion and image size.
 ///
@@ -24,17 +24,20 @@ enum class CameraModel { kPinhole, kRadtan, kEquidistant, kPhotogrammetric };
 ///   equidistant       (x, y) = t s(t^2) (hx, hy) / |(hx, hy)|,        t = atan2(|(hx, hy)|, hz)
 ///   photogrammetric   (x0, y0) = (x, y) s(x^2 + y^2), solved for (x, y)
 ///                     s(q) = 1 + k1 q + k2 q^2 + k3 q^3 + k4 q^4
+///   rational          as radtan, with
+///   polynomial        s(q) = (1 + k1 q + k2 q^2 + k3 q^3) / (1 + k4 q + k5 q^2 + k6 q^3)
 ///
 ///   symbol        shape  unit  frame  meaning
 ///   h             3      any   cam    the point times a positive factor; x right, y down, z ahead
 ///   (u, v)        2      px    -      pixel; (0, 0) is the centre of the upper left pixel
 ///   fx, fy        1      px    -      focal length; > 0
 ///   cx, cy        1      px    -      principal point
-///   k1 to k4      1      -     -      radial distortion: radtan k1 to k3, equidistant k1 to k4,
-///                                     photogrammetric k1, k2
-///   p1, p2        1      -     -      tangential distortion of radtan
+///   k1 to k6      1      -     -      radial distortion: radtan k1 to k3, equidistant k1 to k4,
+///                                     photogrammetric k1, k2, rational polynomial k1 to k6
+///   p1, p2        1      -     -      tangential distortion of radtan and rational polynomial
 ///
-/// radtan and equidistant equal the models of OpenCV and Kalibr. photogrammetric is the model of
+/// radtan and equidistant equal the models of OpenCV and Kalibr; rational polynomial equals the
+/// model of OpenCV and ROS with 8 coefficients. photogrammetric is the model of
 /// MonoSLAM with two parameters. Only the inverse of this model, from pixel to ray, has a closed
 /// form. In the literature, k1 is often in 1/mm^2 and k2 in 1/mm^4, for lengths on the image
 /// sensor. To convert them, multiply k1 by the squared focal length in mm, and k2 by the fourth
@@ -53,7 +56,8 @@ struct Camera {
 
   Camera(int width_px, int height_px, double focal_x, double focal_y, double centre_x,
          double centre_y, CameraModel type = CameraModel::kPinhole,
-         const std::array<double, 4>& k = {}, const std::array<double, 2>& tangential = {})
+         const std::array<double, 4>& k = {}, const std::array<double, 2>& tangential = {},
+         const std::array<double, 3>& denominator = {})
       : model(type),
         width(width_px),
         height(height_px),
@@ -61,12 +65,14 @@ struct Camera {
         fy(focal_y),
         cx(centre_x),
         cy(centre_y),
-        radial(k, type == CameraModel::kEquidistant ? kPi * kPi : kMaxSquaredRadius),
+        radial(k, type == CameraModel::kEquidistant ? kPi * kPi : kMaxSquaredRadius, denominator),
         p(tangential) {}
   explicit Camera(Params& params)
-      : Camera(params, static_cast<CameraModel>(params.Choice(
-                           "camera.model", {"pinhole", "radtan", "equidistant", "photogrammetric"},
-                           "projection and lens distortion", 0))) {}
+      : Camera(params,
+               static_cast<CameraModel>(params.Choice(
+                   "camera.model",
+                   {"pinhole", "radtan", "equidistant", "photogrammetric", "rational_polynomial"},
+                   "projection and lens distortion", 0))) {}
 
   /// Computes the pixel z = (u, v) of h. Returns false if h is out of the domain.
   template <class T>
@@ -110,7 +116,8 @@ struct Camera {
                params.Positive("camera.fy", "px", "vertical focal length"),
                params.Number("camera.cx", "px", "u of the principal point"),
                params.Number("camera.cy", "px", "v of the principal point"), type,
-               ReadRadial(params, type), ReadTangential(params, type)) {}
+               ReadRadial(params, type), ReadTangential(params, type),
+               ReadDenominator(params, type)) {}
   static std::array<double, 4> ReadRadial(Params& params, CameraModel type) {
     std::array<double, 4> k{};
     if (type == CameraModel::kPinhole) return k;
@@ -118,14 +125,23 @@ struct Camera {
     k[1] = params.Number("camera.k2", "", "radial distortion");
     if (type == CameraModel::kPhotogrammetric) return k;
     k[2] = params.Number("camera.k3", "", "radial distortion", {}, 0.0);
-    if (type == CameraModel::kRadtan) return k;
+    if (type != CameraModel::kEquidistant) return k;
     k[3] = params.Number("camera.k4", "", "radial distortion", {}, 0.0);
     return k;
   }
   static std::array<double, 2> ReadTangential(Params& params, CameraModel type) {
-    if (type != CameraModel::kRadtan) return {};
+    if (!HasTangential(type)) return {};
     return {params.Number("camera.p1", "", "tangential distortion"),
             params.Number("camera.p2", "", "tangential distortion")};
+  }
+  static std::array<double, 3> ReadDenominator(Params& params, CameraModel type) {
+    if (type != CameraModel::kRationalPolynomial) return {};
+    return {params.Number("camera.k4", "", "radial distortion, in the denominator"),
+            params.Number("camera.k5", "", "radial distortion, in the denominator"),
+            params.Number("camera.k6", "", "radial distortion, in the denominator")};
+  }
+  static bool HasTangential(CameraModel type) {
+    return type == CameraModel::kRadtan || type == CameraModel::kRationalPolynomial;
   }
 
   template <class T>
@@ -135,7 +151,7 @@ struct Camera {
       T q;
       if (!radial.Invert(T(x0[0] * x0[0] + x0[1] * x0[1]), &q)) return false;
       factor = 1.0 / radial.Factor(q);
-    } else if (model == CameraModel::kRadtan) {
+    } else if (HasTangential(model)) {
       return DistortRadtan(x0, x);
     }
     for (int i = 0; i < 2; ++i) x[i] = factor * x0[i];
@@ -143,7 +159,7 @@ struct Camera {
   }
   template <class T>
   bool Undistort(const T* x, T* x0) const {
-    if (model == CameraModel::kRadtan) return UndistortRadtan(x, x0);
+    if (HasTangential(model)) return UndistortRadtan(x, x0);
     const T q = x[0] * x[0] + x[1] * x[1];
     const bool has_lens = model == CameraModel::kPhotogrammetric;
     if (has_lens && !(detail::ValueOf(q) <= radial.q_max)) return false;

@@ -18,28 +18,37 @@ double ValueOf(const T& x) {
   }
 }
 
-/// Radial polynomial r s(r^2) with s(q) = 1 + k1 q + k2 q^2 + k3 q^3 + k4 q^4. The polynomial
-/// increases on its domain 0 <= r^2 <= q_max. The argument of the functions is q = r^2, because
-/// they are then smooth at r = 0.
+/// Radial polynomial r s(r^2) with s(q) = 1 + k1 q + k2 q^2 + k3 q^3 + k4 q^4, or the quotient of
+/// this s(q) and 1 + d1 q + d2 q^2 + d3 q^3. The function increases on its domain
+/// 0 <= r^2 <= q_max. The argument of the functions is q = r^2, because they are then smooth at
+/// r = 0.
 struct RadialPolynomial {
   std::array<double, 4> k{};
+  std::array<double, 3> d{};  ///< coefficients of the denominator
+  bool has_denominator = false;
   double q_max = 0.0;
 
   RadialPolynomial() = default;
-  /// Sets q_max to `limit`, or to the first maximum of r s(r^2) if this maximum is below `limit`.
-  /// The relative error of the maximum is at most 1 %.
-  RadialPolynomial(const std::array<double, 4>& coefficients, double limit) : k(coefficients) {
-    for (double q = 1e-6; q < limit && Slope(q) > 0.0; q *= 1.01) q_max = q;
+  /// Sets q_max to `limit`, or to the first maximum or pole of r s(r^2) if this point is below
+  /// `limit`. The relative error of the point is at most 1 %.
+  RadialPolynomial(const std::array<double, 4>& coefficients, double limit,
+                   const std::array<double, 3>& denominator = {})
+      : k(coefficients), d(denominator), has_denominator(denominator != std::array<double, 3>{}) {
+    for (double q = 1e-6; q < limit && Factor(q) > 0.0 && Slope(q) > 0.0; q *= 1.01) q_max = q;
     if (q_max > 0.98 * limit) q_max = limit;
   }
   /// Returns s(q).
   template <class T>
   T Factor(const T& q) const {
-    return 1.0 + q * (k[0] + q * (k[1] + q * (k[2] + q * k[3])));
+    const T numerator = 1.0 + q * (k[0] + q * (k[1] + q * (k[2] + q * k[3])));
+    return has_denominator ? T(numerator / Denominator(q)) : numerator;
   }
   /// Returns ds/dq.
   double FactorSlope(double q) const {
-    return k[0] + q * (2.0 * k[1] + q * (3.0 * k[2] + q * 4.0 * k[3]));
+    const double slope = k[0] + q * (2.0 * k[1] + q * (3.0 * k[2] + q * 4.0 * k[3]));
+    if (!has_denominator) return slope;
+    const double denominator_slope = d[0] + q * (2.0 * d[1] + q * 3.0 * d[2]);
+    return (slope - Factor(q) * denominator_slope) / Denominator(q);
   }
   /// Returns d (r s(r^2)) / dr at r^2 = q.
   double Slope(double q) const { return Factor(q) + 2.0 * q * FactorSlope(q); }
@@ -65,6 +74,12 @@ struct RadialPolynomial {
     // (implicit function theorem).
     *q = x - (x * Factor(x) * Factor(x) - square) / (Factor(x) * Slope(x));
     return true;
+  }
+
+ private:
+  template <class T>
+  T Denominator(const T& q) const {
+    return 1.0 + q * (d[0] + q * (d[1] + q * d[2]));
   }
 };
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "alidade/experiment/calibration_file.h"
 #include "alidade/io/number_rows.h"
 #include "feature_tracker.h"
-#include "plugins/common/calibration_file.h"
 #include "plugins/common/companion_files.h"
 #include "plugins/common/images/camera_size.h"
 #include "plugins/common/images/grey_image.h"

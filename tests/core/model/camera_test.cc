@@ -23,6 +23,10 @@ Camera Made(CameraModel model, const std::array<double, 4>& k = {},
 Camera Pinhole() { return Made(CameraModel::kPinhole); }
 Camera Radtan() { return Made(CameraModel::kRadtan, {-0.28, 0.07, 0.015, 0.0}, {0.0012, -0.0007}); }
 Camera Equidistant() { return Made(CameraModel::kEquidistant, {-0.012, 0.034, -0.021, 0.005}); }
+Camera Rational() {
+  return Camera(640, 480, 525, 520, 320.5, 239.25, CameraModel::kRationalPolynomial,
+                {-0.16, 0.05, 0.004, 0.0}, {0.0012, -0.0007}, {0.12, -0.03, 0.008});
+}
 // The lens of MonoSLAM has f = 2.1735 mm, pixels of 0.0112 mm, k1 = 0.06333 mm^-2 and
 // k2 = 0.0139 mm^-4.
 Camera Photogrammetric() {
@@ -32,7 +36,8 @@ Camera Photogrammetric() {
                 {6.333e-2 * kF2, 1.39e-2 * kF2 * kF2, 0.0, 0.0});
 }
 const std::vector<Camera>& All() {
-  static const std::vector<Camera> all{Pinhole(), Radtan(), Equidistant(), Photogrammetric()};
+  static const std::vector<Camera> all{Pinhole(), Radtan(), Equidistant(), Photogrammetric(),
+                                       Rational()};
   return all;
 }
 
@@ -61,6 +66,12 @@ TEST(Camera, ProjectsAsOpenCvDoes) {
                            {320.5, 239.25},
                            {597.528566563672, 444.315605924274},
                            {320.55249994834, 239.146000097136}}});
+  // Likewise, with (k1, k2, p1, p2, k3, k4, k5, k6).
+  ExpectPixels(Rational(), {{{472.371221148703, 139.01635428911},
+                             {101.016300901233, 384.290458769979},
+                             {320.5, 239.25},
+                             {599.939375287704, 446.095638547525},
+                             {320.55249994834, 239.146000097136}}});
   // The expected pixels were computed by cv::fisheye::projectPoints.
   ExpectPixels(Equidistant(), {{{471.513622615548, 139.533068241162},
                                 {104.188698091775, 382.084129514002},
@@ -166,6 +177,43 @@ TEST(Camera, IsDefinedWhereTheDistortionGrows) {
   const Pixel beyond{320.5 + 525 * turn, 239.25};  // no ray is projected to this pixel
   Point h{7, 7, 7};
   EXPECT_FALSE(camera.Unproject(beyond.data(), h.data()));
+}
+
+// With k4 = -0.5 and the other coefficients zero, s(q) = 1 / (1 - 0.5 q) has a pole at q = 2.
+TEST(Camera, IsDefinedBeforeThePoleOfTheDistortion) {
+  const Camera camera(640, 480, 525, 520, 320.5, 239.25, CameraModel::kRationalPolynomial, {}, {},
+                      {-0.5, 0.0, 0.0});
+  const double pole = std::sqrt(2.0);
+  Pixel z{7, 7};
+  for (const double r : {pole * 1.001, 2.0, 100.0}) {
+    const Point h{r, 0, 1};
+    EXPECT_FALSE(camera.Project(h.data(), z.data())) << r;
+  }
+  EXPECT_EQ(z, (Pixel{7, 7}));
+  const Point within{pole * 0.98, 0, 1};
+  EXPECT_TRUE(camera.Project(within.data(), z.data()));
+}
+
+TEST(Camera, RationalPolynomialIsReadFromParameters) {
+  const MapHost host({{"camera.model", {4}},
+                      {"camera.width", {640}},
+                      {"camera.height", {480}},
+                      {"camera.fx", {525}},
+                      {"camera.fy", {520}},
+                      {"camera.cx", {320.5}},
+                      {"camera.cy", {239.25}},
+                      {"camera.k1", {-0.16}},
+                      {"camera.k2", {0.05}},
+                      {"camera.k3", {0.004}},
+                      {"camera.k4", {0.12}},
+                      {"camera.k5", {-0.03}},
+                      {"camera.k6", {0.008}},
+                      {"camera.p1", {0.0012}},
+                      {"camera.p2", {-0.0007}}});
+  Params params(host.c());
+  const Camera camera(params);
+  EXPECT_TRUE(host.missing().empty());
+  for (const Point& h : kPoints) EXPECT_EQ(Projected(camera, h), Projected(Rational(), h));
 }
 
 TEST(Camera, ContainsItsPixelsWhole) {

@@ -57,7 +57,7 @@ BundleFile ReadBundle(const std::filesystem::path& file);
 /// Input files of a problem in the format `tracks`.
 struct BundleTracks {
   std::filesystem::path tracks;  ///< file with rows `frame,feature,dim,value`
-  std::filesystem::path camera;  ///< YAML with `camera`; a stereo pair has `camera.baseline_m`
+  std::filesystem::path camera;  ///< calibration; a stereo pair has `camera.baseline_m`
   std::filesystem::path start;   ///< TUM file, `t x y z qx qy qz qw`, world_from_cam
 };
 

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "alidade/bundle/bundle_file.h"
+#include "alidade/experiment/calibration_file.h"
 #include "alidade/io/number_rows.h"
 #include "alidade/model/geometry.h"
 #include "alidade/state/dense_algebra.h"
@@ -156,18 +157,20 @@ std::optional<std::array<double, 3>> Triangulate(
   return point;
 }
 
-/// Creates the sensor of a problem in the format `tracks` from the camera file. Errors contain the
-/// name of the camera file. Sets `text` to the YAML of the sensor.
+/// Creates the sensor of a problem in the format `tracks` from the calibration file. Errors contain
+/// the name of this file. Sets `text` to the YAML of the sensor.
 SharedSensor TrackSensor(const BundleTracks& sources, int dims, const PluginHost& host,
                          std::string& text) {
-  Config config = Config::FromFile(sources.camera);
+  const Config calibration = ReadCalibrationFile(sources.camera, {.noise = true});
   const char* const model = dims == 4 ? "stereo_feature" : "inverse_depth_feature";
-  config.Set("model", model, "bundle");
+  Config config = Config::FromText("model: " + std::string(model), sources.camera.string())
+                      .Merged(calibration.root().At("calibration"));
   const bool has_noise =
       config.root().HasUnread("sigma_px") || config.root().HasUnread("covariance");
   if (!has_noise) config.Set("sigma_px", "1", "bundle");
   const SharedSensor sensor = host.CreateSensor(model, config.root(), "xyz");
-  config.root().Declare("model");
+  for (const char* key : {"model", "vehicle_from_cam"}) config.root().Declare(key);
+  config.root().At("camera").Declare("baseline_m");  // one camera of a pair
   config.root().RejectUnread();
   text = config.ToYaml();
   return sensor;

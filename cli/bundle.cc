@@ -18,12 +18,13 @@ constexpr const char* kBundleFooter = R"(Examples:
   alidade bundle problem-16-22106-pre.txt -o runs/bal
   bzcat problem-16-22106-pre.txt.bz2 | alidade bundle - --loss huber=1.5
   alidade bundle bundle.out --fix intrinsics -o runs/bundler
+  alidade bundle sparse/0 -o runs/colmap
   alidade bundle data/tracks.csv --camera data/calibration.yaml --start run/trajectory.tum -o runs/a
 
 PROBLEM is a file in the format BAL, Bundler v0.3 or libmv, which is detected from the first bytes,
-or a file of tracks that `alidade simulate` wrote. Ctrl-C stops after the current iteration; the
-result of this iteration is kept. Exit code 0: converged; 1: the maximum number of iterations was
-reached; 75: a signal stopped the solver; 79: the solver failed.)";
+a COLMAP folder of text files, or a file of tracks that `alidade simulate` wrote. Ctrl-C stops after
+the current iteration; the result of this iteration is kept. Exit code 0: converged; 1: the maximum
+number of iterations was reached; 75: a signal stopped the solver; 79: the solver failed.)";
 
 struct BundleArguments {
   std::string problem, folder, loss;
@@ -192,9 +193,12 @@ ExitCode RunBundle(const BundleArguments& arguments) {
 void AddBundle(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand(
       "bundle",
-      "Adjust cameras and points to minimise the reprojection error: BAL, Bundler, libmv, tracks");
+      "Adjust cameras and points to minimise the reprojection error: BAL, Bundler, libmv, COLMAP, "
+      "tracks");
   const auto arguments = std::make_shared<BundleArguments>();
-  command.add_option("PROBLEM", arguments->problem, "file to solve; `-` for standard input")
+  command
+      .add_option("PROBLEM", arguments->problem,
+                  "file or COLMAP folder to solve; `-` for standard input")
       ->option_text(" ")
       ->required()
       ->check(IsNonEmpty);

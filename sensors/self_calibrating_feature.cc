@@ -7,11 +7,14 @@ namespace {
 
 void Make(alidade::Params& p, AlidadeInstance* instance) {
   using alidade::SelfCalibratingFeature;
-  if (p.Choice("lens", {"radial", "radtan"}, "lens model, which determines the intrinsics", 0) ==
-      1) {
-    alidade::EmplaceSensor<SelfCalibratingFeature<alidade::RadtanLens>>(p, instance);
-  } else {
-    alidade::EmplaceSensor<SelfCalibratingFeature<alidade::RadialLens>>(p, instance);
+  switch (p.Choice("lens", {"radial", "radtan", "opencv"},
+                   "lens model, which determines the intrinsics", 0)) {
+    case 1:
+      return alidade::EmplaceSensor<SelfCalibratingFeature<alidade::RadtanLens>>(p, instance);
+    case 2:
+      return alidade::EmplaceSensor<SelfCalibratingFeature<alidade::OpenCvLens>>(p, instance);
+    default:
+      return alidade::EmplaceSensor<SelfCalibratingFeature<alidade::RadialLens>>(p, instance);
   }
 }
 

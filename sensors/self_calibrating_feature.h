@@ -88,6 +88,39 @@ struct RadtanLens {
   }
 };
 
+/// Lens with two focal lengths, as in the camera models OPENCV and PINHOLE of COLMAP. The
+/// distortion is that of RadtanLens without k3.
+///
+///   z = c + (fx x', fy y'),   (x', y') = the distorted (x, y) of RadtanLens
+struct OpenCvLens {
+  static constexpr Quantity kIntrinsics{"intrinsics", "",
+                                        "focal lengths and principal point in px, distortion",
+                                        "fx,fy,cx,cy,k1,k2,p1,p2"};
+  static constexpr int kSize = 8;
+
+  /// Computes z of the ray (x, y, 1) for the intrinsics k = (fx, fy, cx, cy, k1, k2, p1, p2).
+  template <class T>
+  static void Project(const T* k, const T& x, const T& y, T* z) {
+    const T unit[8] = {T(1.0), T(0.0), T(0.0), k[4], k[5], T(0.0), k[6], k[7]};
+    RadtanLens::Project(unit, x, y, z);
+    for (int i = 0; i < 2; ++i) z[i] = k[2 + i] + k[i] * z[i];
+  }
+  /// Computes the Jacobians of Project: J_z_x = dz/d(x, y), 2x2 row-major, and J_z_k = dz/dk.
+  static void Jacobian(const double* k, double x, double y, double* J_z_x, MatrixRef J_z_k) {
+    const double unit[8] = {1.0, 0.0, 0.0, k[4], k[5], 0.0, k[6], k[7]};
+    double distorted[2], j[16] = {};
+    RadtanLens::Project(unit, x, y, distorted);
+    RadtanLens::Jacobian(unit, x, y, J_z_x, MatrixRef{j, 8});
+    constexpr int kDistortion[4] = {3, 4, 6, 7};  // k1, k2, p1, p2 in the intrinsics of RadtanLens
+    for (int i = 0; i < 2; ++i) {
+      for (int c = 0; c < 2; ++c) J_z_x[2 * i + c] *= k[i];
+      J_z_k(i, i) = distorted[i];
+      J_z_k(i, 2 + i) = 1.0;
+      for (int c = 0; c < 4; ++c) J_z_k(i, 4 + c) = k[i] * j[8 * i + kDistortion[c]];
+    }
+  }
+};
+
 /// Pixel at which a camera observes a point. The intrinsics of the camera are also estimated.
 ///
 ///   model      (u, v) = K(k; hx/hz, hy/hz) + n,   n ~ N(0, R),   h = R_CW (p - r)

@@ -7,6 +7,7 @@
 
 #include "support/bal_formula.h"
 #include "support/bundles.h"
+#include "support/colmap_formula.h"
 #include "support/program.h"
 
 namespace alidade {
@@ -37,6 +38,47 @@ TEST_F(BundleCli, AdjustsAndWritesTheSameFormat) {
   EXPECT_EQ(Call({"bundle", "none.txt", "-o", "out"}).code, 73)
       << "an existing output is refused before the input is read";
   EXPECT_EQ(Call({"bundle", "p.txt", "-o", "out", "--force", "--quiet"}).out, "");
+}
+
+TEST_F(BundleCli, AdjustsColmapFolders) {
+  for (const auto& [model, parameters] : std::map<std::string, std::vector<double>>{
+           {"SIMPLE_PINHOLE", {700, 500, 400}},
+           {"PINHOLE", {700, 710, 500, 400}},
+           {"SIMPLE_RADIAL", {700, 500, 400, -0.1}},
+           {"RADIAL", {700, 500, 400, -0.1, 0.02}},
+           {"OPENCV", {700, 710, 500, 400, -0.1, 0.02, 0.001, -0.002}}}) {
+    testing::WriteColmap(folder_ / "sparse", model, parameters, 0.05);
+    const double before = testing::ColmapRms(folder_ / "sparse");
+    EXPECT_GT(before, 1.0);
+    const Outcome made = Call({"bundle", "sparse", "-o", "out", "--force"});
+    EXPECT_EQ(made.code, 0) << model << made.err;
+    EXPECT_TRUE(Contains(made.out, "colmap: 6 cameras, 30 points, 180 observations\n")) << made.out;
+    EXPECT_NEAR(Json("out/bundle.json").root().At("rms_before_px").Number(), before, 1e-9);
+    EXPECT_LT(testing::ColmapRms(folder_ / "out/problem"), 1e-6) << model;
+    std::istringstream camera(Read("out/problem/cameras.txt"));
+    std::string line, word;
+    std::getline(std::getline(camera, line), line);
+    std::istringstream row(line);
+    row >> word >> word >> word >> word;
+    EXPECT_TRUE(line.starts_with("7 " + model + " 1000 800 ")) << line;
+    for (const double expected : parameters) {
+      double value = 0.0;
+      row >> value;
+      EXPECT_NEAR(value, expected, 1e-4 * std::abs(expected) + 1e-5) << model << ": " << line;
+    }
+    EXPECT_FALSE(row >> word) << line;
+    EXPECT_TRUE(Contains(Read("out/problem/images.txt"), " 7 image 3.jpg\n1.5 2.5 -1 "));
+  }
+}
+
+TEST_F(BundleCli, APoseGraphIsNotABundleAdjustmentProblem) {
+  Write("graph.g2o", "VERTEX_SE3:QUAT 4 1 2 3 0 0 0 1\n");
+  const Outcome made = Call({"bundle", "graph.g2o"});
+  EXPECT_EQ(made.code, 65);
+  EXPECT_TRUE(made.err.starts_with(
+      "error: graph.g2o:1:1: the file is a graph of g2o (VERTEX_SE3:QUAT): its edges are relative "
+      "poses, which bundle adjustment does not use; expected pixels of points"))
+      << made.err;
 }
 
 TEST_F(BundleCli, SaysWhatIsWrong) {

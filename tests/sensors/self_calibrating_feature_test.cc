@@ -72,6 +72,21 @@ TEST(SelfCalibratingFeature, IsTheRadtanLensOfTheOtherSensors) {
   EXPECT_NEAR(z[1], pixel[1], 1e-10);
 }
 
+const std::vector<double> kOpenCv{500, 510, 320, 240, -0.3, 0.2, 0.01, -0.02};
+
+TEST(SelfCalibratingFeature, IsTheCameraOfOpenCvWithTwoFocalLengths) {
+  const Camera camera(640, 480, 500, 510, 320, 240, CameraModel::kRadtan, {-0.3, 0.2, 0, 0},
+                      {0.01, -0.02});
+  double along[3], h[3], pixel[2];
+  for (std::size_t i = 0; i < 3; ++i) along[i] = kRadial[3][i] - kRadial[0][i];
+  UnitQuaternion::RotateBack(kRadial[1].data(), along, h);
+  ASSERT_TRUE(camera.Project(h, pixel));
+  const std::vector<double> z =
+      Predicted(Made<OpenCvLens>(), {kRadial[0], kRadial[1], kOpenCv, kRadial[3]});
+  EXPECT_NEAR(z[0], pixel[0], 1e-10);
+  EXPECT_NEAR(z[1], pixel[1], 1e-10);
+}
+
 template <class Lens>
 void ExpectTrueJacobian(const Blocks& roles) {
   ExpectSame(SensorJacobian(Made<Lens>(), roles), NumericSensorJacobian(Made<Lens>(), roles), 1e-8);
@@ -79,6 +94,7 @@ void ExpectTrueJacobian(const Blocks& roles) {
 TEST(SelfCalibratingFeature, HasTrueJacobians) {
   ExpectTrueJacobian<RadialLens>(kRadial);
   ExpectTrueJacobian<RadtanLens>({kRadial[0], kRadial[1], kRadtan, kRadial[3]});
+  ExpectTrueJacobian<OpenCvLens>({kRadial[0], kRadial[1], kOpenCv, kRadial[3]});
 }
 
 TEST(SelfCalibratingFeature, SeesNothingBehindIt) {

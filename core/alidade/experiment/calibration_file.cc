@@ -234,8 +234,9 @@ class CalibrationFile {
   /// Sets the intrinsics from a list of the 9 numbers of a camera matrix.
   void SetMatrix(const Node& matrix) {
     const std::vector<double> k = matrix.Numbers(9);
-    if (k[1] != 0.0 || k[3] != 0.0 || k[6] != 0.0 || k[7] != 0.0 || k[8] != 1.0) {
-      matrix.Fail("this is not a camera matrix without skew", "[fx, 0, cx, 0, fy, cy, 0, 0, 1]");
+    if (k[1] != 0.0) matrix.Fail("a camera with skew is not supported", "0 as the second number");
+    if (k[3] != 0.0 || k[6] != 0.0 || k[7] != 0.0 || k[8] != 1.0) {
+      matrix.Fail("this is not a camera matrix", "[fx, 0, cx, 0, fy, cy, 0, 0, 1]");
     }
     SetIntrinsics({k[0], k[4], k[2], k[5]}, matrix.place());
   }

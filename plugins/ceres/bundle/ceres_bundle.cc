@@ -44,7 +44,9 @@ class Bundle {
  public:
   Bundle(const SensorModel& sensor, const BundleProblem& problem, const BundleOptions& options)
       : sensor_(sensor), roles_(RolesOf(sensor)), problem_data_(problem), options_(options) {
-    fixed_ = FixedElements(sensor, options.fixed);
+    std::vector<std::string> fixed = problem.fixed;
+    fixed.insert(fixed.end(), options.fixed.begin(), options.fixed.end());
+    fixed_ = FixedElements(sensor, fixed);
     if (roles_.intrinsics >= 0) {
       lens_ = sensor.roles()[static_cast<std::size_t>(roles_.intrinsics)].geometry;
       lens_in_camera_block_ = !all_fixed() && HasUniqueIntrinsics();

@@ -361,7 +361,7 @@ TEST_F(CheckTest, ShippedModelsPass) {
        "{noise: {linear_velocity: [0.03, 0.3, 0.3], angular_velocity: 0.002}, vehicle_from_cam: "
        "{position: [1, 0, 1.5], orientation: {w: 0.5, x: -0.5, y: 0.5, z: -0.5}}}"},
   };
-  for (const char* lens : {"radial", "radtan"}) {
+  for (const char* lens : {"radial", "radtan", "opencv"}) {
     parameters.emplace("self_calibrating_feature",
                        std::string("{sigma_px: 1, lens: ") + lens + "}");
   }

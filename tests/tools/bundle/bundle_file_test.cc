@@ -170,6 +170,14 @@ TEST_F(BundleFiles, ATextOfAnotherFormatNamesTheFormats) {
     ExpectBad(text, {":1:1: the format of the file is unknown", "(BAL)", "(Bundler)", "(libmv)"});
 }
 
+TEST_F(BundleFiles, APoseGraphOfG2oIsNamed) {
+  for (const std::string word : {"VERTEX_SE3:QUAT", "EDGE_SE3:QUAT", "VERTEX_SE2", "FIX"}) {
+    ExpectBad("\n" + word + " 0 0 0 0 0 0 0 1\n",
+              {":1:1: the file is a graph of g2o (" + word + ")", "relative poses", "COLMAP",
+               "the sensor relative_pose"});
+  }
+}
+
 TEST_F(BundleFiles, RefusesBadBal) {
   ExpectBad("", {":1:1: the file is empty"});
   ExpectBad("1 1 1\n0 1 2 3\n", {":2:3: '1' is out of range; expected the point", "from 0 to 0"});

@@ -38,7 +38,8 @@ struct BundleProblem {
   std::string sensor;
   std::vector<BundleCamera> cameras;
   std::vector<std::vector<double>> intrinsics;  ///< empty if the sensor has no role `intrinsics`
-  std::vector<std::array<double, 3>> points;    ///< positions in the world
+  std::vector<std::string> fixed;  ///< elements of the intrinsics that always remain constant
+  std::vector<std::array<double, 3>> points;  ///< positions in the world
   std::vector<BundleObservation> observations;
 };
 
@@ -53,7 +54,8 @@ struct BundleOptions {
   /// within the rounding error of the cost counts as no change for any tolerance.
   double function_tolerance = 1e-8;
   RobustLoss loss;
-  std::vector<std::string> fixed;     ///< elements of the intrinsics to fix; `intrinsics` fixes all
+  /// Elements of the intrinsics to fix, besides BundleProblem::fixed; `intrinsics` fixes all.
+  std::vector<std::string> fixed;
   std::function<bool()> stop;         ///< if it returns true, the current iteration is the last
   std::function<void(int)> progress;  ///< called with the number of completed iterations
 };

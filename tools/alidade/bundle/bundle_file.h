@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "alidade/base/timestamp.h"
@@ -16,13 +17,16 @@
 ///            (angle-axis and t of cam_from_world, f, k1, k2); 3 numbers for each point
 ///                                                                 -z, y up
 ///   bundler  text: `# Bundle file v0.3`                           -z, y up
+///   colmap   folder with cameras.txt, images.txt and points3D.txt: qw qx qy qz and t of
+///            cam_from_world; lenses shared by images       +z, y down
 ///   libmv    binary: 32-bit numbers; one lens f, c, k, p for all images               +z, y down
 ///   tracks   `frame,feature,dim,value`; calibration and initial poses in other files  +z, y down
 ///
-/// In the problem, a camera always looks along +z with y down, and v grows downwards.
+/// In the problem, a camera always looks along +z with y down, and v grows downwards. Pixels have
+/// the origin of the file. In COLMAP, the centre of the upper left pixel is (0.5, 0.5).
 namespace alidade {
-enum class BundleFormat { kBal, kBundler, kLibmv, kTracks };
-/// Returns `bal`, `bundler`, `libmv` or `tracks`.
+enum class BundleFormat { kBal, kBundler, kLibmv, kTracks, kColmap };
+/// Returns `bal`, `bundler`, `libmv`, `tracks` or `colmap`.
 const char* ToString(BundleFormat format);
 
 /// Problem, and the other contents of its file, which are needed to write the file again.
@@ -38,11 +42,21 @@ struct BundleFile {
     bool registered = true;  ///< false: the file does not contain a pose (bundler)
   };
   std::vector<Pose> poses;
-  std::vector<std::string> colours;      ///< bundler: colour of each point
+  std::vector<std::string> colours;      ///< bundler, colmap: colour of each point
   std::vector<std::int64_t> keys;        ///< bundler: key of each observation
-  std::vector<std::int64_t> camera_ids;  ///< libmv: image; tracks: frame; otherwise empty
-  std::vector<std::int64_t> point_ids;   ///< libmv: track; tracks: feature; otherwise empty
+  std::vector<std::int64_t> camera_ids;  ///< libmv, colmap: image; tracks: frame; otherwise empty
+  std::vector<std::int64_t> point_ids;   ///< libmv, colmap, tracks: id of the point; else empty
   std::vector<Timestamp> timestamps;     ///< tracks: timestamp of each camera; otherwise empty
+  /// colmap: `ID MODEL WIDTH HEIGHT` of each lens, and the number of its parameters.
+  std::vector<std::string> lenses;
+  std::size_t lens_parameters = 0;
+  std::vector<std::string> images;  ///< colmap: `CAMERA_ID NAME` of each image
+  /// colmap: feature of an image. Its point is -1 if it belongs to no point.
+  struct Feature {
+    std::array<double, 2> z;
+    int point;
+  };
+  std::vector<std::vector<Feature>> features;  ///< colmap: features of each image
   // Numbers of excluded items. They are 0 for all formats except tracks.
   int points_left_out = 0;        ///< points that could not be triangulated
   int frames_left_out = 0;        ///< frames without a pose
@@ -50,8 +64,9 @@ struct BundleFile {
   int invalid_observations = 0;   ///< observations that the sensor model rejects
 };
 
-/// Reads a problem. The beginning of the file determines the format: bal, bundler or libmv. `-` is
-/// standard input. Errors: kInputMissing; kBadData with the position in the file.
+/// Reads a problem. The beginning of the file determines the format: bal, bundler or libmv. The
+/// format of a folder is colmap. `-` is standard input. Errors: kInputMissing; kBadData with the
+/// position in the file.
 BundleFile ReadBundle(const std::filesystem::path& file);
 
 /// Input files of a problem in the format `tracks`.
@@ -71,8 +86,13 @@ struct BundleTracks {
 BundleFile ReadBundleTracks(const BundleTracks& sources, const PluginHost& host);
 
 /// Returns the text of the problem in the format of its file. Numbers have the shortest form that
-/// reads back exactly (libmv: the nearest 32-bit number). Tracks are not supported, because a file
-/// of tracks does not contain poses.
+/// reads back exactly (libmv: the nearest 32-bit number). Formats of several files are not
+/// supported.
 std::string BundleText(const BundleFile& file);
+
+/// Returns the files of the problem in its format, as pairs of a path and a text: `problem.txt`
+/// (bal), `problem.out` (bundler), `problem.bin` (libmv) or three files in `problem/` (colmap).
+/// Returns no files for tracks, because a file of tracks does not contain poses.
+std::vector<std::pair<std::string, std::string>> BundleTexts(const BundleFile& file);
 
 }  // namespace alidade

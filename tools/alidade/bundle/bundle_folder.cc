@@ -16,11 +16,6 @@ namespace {
 using internal::AppendNumber;
 using internal::OutputFolder;
 
-const char* ExtensionOf(BundleFormat format) {
-  constexpr const char* kExtensions[] = {".txt", ".out", ".bin", ""};
-  return kExtensions[static_cast<int>(format)];
-}
-
 /// Returns the number of a camera or point in the file of the problem.
 std::int64_t IdOf(const std::vector<std::int64_t>& ids, std::size_t index) {
   return ids.empty() ? static_cast<std::int64_t>(index) : ids[index];
@@ -156,9 +151,7 @@ void BundleFolder::Save(const BundleFile& file, const BundleProblem& start,
   output_->Write("poses_before.tum", PosesTum(file, start));
   output_->Write("observations.csv", ObservationsCsv(file, start, sensor));
   output_->Write("iterations.csv", IterationsCsv(result));
-  if (file.format != BundleFormat::kTracks) {
-    output_->Write(std::string("problem") + ExtensionOf(file.format), BundleText(file));
-  }
+  for (const auto& [name, text] : BundleTexts(file)) output_->Write(name, text);
   internal::CommitWithPage(*output_);
 }
 

@@ -15,7 +15,7 @@ class OutputFolder;
 ///
 ///   file              content
 ///   problem.EXT       adjusted problem in the format of the input; omitted for tracks. EXT is txt
-///                     (bal), out (bundler) or bin (libmv)
+///                     (bal), out (bundler) or bin (libmv). The files of colmap are in problem/
 ///   poses.tum         t x y z qx qy qz qw, world_from_cam, of registered cameras; t is the time in
 ///                     s or the number of the camera
 ///   points.csv        point,x,y,z

@@ -16,7 +16,9 @@ namespace alidade::internal {
 /// position in the file.
 class BundleCursor {
  public:
-  BundleCursor(std::string_view text, std::string name) : text_(text), name_(std::move(name)) {}
+  /// If `by_line` is true, only NextRow() and NextLine() continue at another line.
+  BundleCursor(std::string_view text, std::string name, bool by_line = false)
+      : text_(text), name_(std::move(name)), by_line_(by_line) {}
 
   /// Reads the next number.
   double Number(const char* quantity) {
@@ -31,19 +33,28 @@ class BundleCursor {
   }
   /// Reads an integer in [0, limit).
   int Index(const char* quantity, std::int64_t limit) {
+    return static_cast<int>(Integer(quantity, 0, limit - 1));
+  }
+  /// Reads an integer in [low, high].
+  std::int64_t Integer(const char* quantity, std::int64_t low, std::int64_t high) {
     const std::string_view word = Word(quantity);
-    std::int64_t value = -1;
+    std::int64_t value = low - 1;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     const bool is_integer =
         error != std::errc::invalid_argument && end == word.data() + word.size();
-    if (!is_integer || error != std::errc() || value < 0 || value >= limit) {
-      FailWord(word, is_integer ? "is out of range" : "is not a whole number",
-               std::string(quantity) + ", from 0 to " + std::to_string(limit - 1));
+    if (!is_integer || error != std::errc() || value < low || value > high) {
+      FailWord(
+          word, is_integer ? "is out of range" : "is not a whole number",
+          std::string(quantity) + ", from " + std::to_string(low) + " to " + std::to_string(high));
     }
-    return static_cast<int>(value);
+    return value;
   }
   /// Reads the next word.
   std::string_view Word(const char* quantity) {
+    if (by_line_ && IsAtLineEnd()) {
+      word_start_ = offset_;
+      Fail("the line ends here", quantity);
+    }
     SkipBlanks();
     if (offset_ == text_.size()) Fail("the file ends here", quantity);
     word_start_ = offset_;
@@ -59,6 +70,34 @@ class BundleCursor {
   /// Skips the remainder of the line.
   void SkipLine() {
     while (offset_ < text_.size() && text_[offset_] != '\n') ++offset_;
+  }
+  /// Skips empty lines and comments, which begin with `#`. Returns false at the end of the file.
+  bool NextRow() {
+    for (;; SkipLine()) {
+      SkipBlanks();
+      if (offset_ == text_.size()) return false;
+      if (text_[offset_] != '#') return true;
+    }
+  }
+  /// Continues at the beginning of the next line.
+  void NextLine() {
+    SkipLine();
+    if (offset_ == text_.size()) return;
+    line_start_ = ++offset_;
+    ++line_;
+  }
+  /// Skips blanks. Returns true at the end of the line or file.
+  bool IsAtLineEnd() {
+    while (offset_ < text_.size() && text_[offset_] != '\n' && IsBlank(text_[offset_])) ++offset_;
+    return offset_ == text_.size() || text_[offset_] == '\n';
+  }
+  /// Reads the remainder of the line without the blanks around it.
+  std::string_view RemainderOfLine() {
+    const std::size_t start = IsAtLineEnd() ? offset_ : (word_start_ = offset_);
+    SkipLine();
+    std::string_view remainder = text_.substr(start, offset_ - start);
+    while (!remainder.empty() && IsBlank(remainder.back())) remainder.remove_suffix(1);
+    return remainder;
   }
   /// Reports an error at the word that was read last.
   [[noreturn]] void Fail(const std::string& problem, const std::string& expected) const {
@@ -87,6 +126,7 @@ class BundleCursor {
 
   std::string_view text_;
   std::string name_;
+  bool by_line_;
   std::size_t offset_ = 0, word_start_ = 0, line_start_ = 0;
   int line_ = 1;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -13,6 +14,14 @@ namespace alidade::internal {
 BundleFile ReadBal(std::string_view text, const std::string& name);
 BundleFile ReadBundler(std::string_view text, const std::string& name);
 BundleFile ReadLibmv(std::string_view bytes, const std::string& name);
+
+/// Texts of the three files of a COLMAP folder.
+struct ColmapTexts {
+  std::string cameras, images, points;
+};
+/// Reads a COLMAP folder whose files have these texts.
+BundleFile ReadColmap(const ColmapTexts& texts, const std::filesystem::path& folder);
+ColmapTexts ColmapTextsOf(const BundleFile& file);
 
 std::string BalText(const BundleFile& file);
 std::string BundlerText(const BundleFile& file);

@@ -9,7 +9,7 @@ namespace alidade {
 ///
 ///   model      q' = q Exp((omega - b - w) dt),   b' = b
 ///              b is a model parameter state, known to be 0 unless the config defines an initial
-///              value; the config may also give it dynamics
+///              value
 ///   noise      continuous: w ~ N(0, sigma^2 I / dt), white noise of the gyroscope
 ///   Jacobian   automatic differentiation               6 x 6; exact at omega = 0
 ///

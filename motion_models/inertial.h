@@ -20,7 +20,7 @@ enum class InertialIntegration { kExact = 0, kEuler = 2, kMidpoint = 3 };
 ///              euler      Y_1 = Y_2 = I: the orientation at the start
 ///              midpoint   Y_1 = Y_2 = Exp(phi/2): the orientation in the middle of the step
 ///              b_omega, b_f are model parameter states, known to be 0 unless the config defines
-///              initial values; the config may also give them dynamics
+///              initial values
 ///   noise      continuous: w = (w_omega, w_f) ~ N(0, diag(sigma_omega^2, sigma_f^2) / dt), white
 ///   Jacobian   automatic differentiation               15 x 15; exact at phi = 0
 ///

@@ -13,7 +13,7 @@ enum class InertialIntegration { kExact = 0, kEuler = 2, kMidpoint = 3 };
 /// Body with an inertial measurement unit (strapdown navigation).
 ///
 ///   model      r' = r + v dt + (R(q) Y_2 f + g) dt^2/2,   v' = v + (R(q) Y_1 f + g) dt
-///              q' = q Exp(phi),   b_omega' = b_omega,   b_f' = b_f
+///              q' = q Exp(phi),   b_omega' = b_omega + w_1,   b_f' = b_f + w_2
 ///              phi = (omega - b_omega - w_omega) dt,   f = f_m - b_f - w_f
 ///              exact      Y_1 = Gamma_1(phi),  Y_2 = 2 Gamma_2(phi): the integrals over dt of
 ///                         force and turn that are constant in the body
@@ -21,7 +21,9 @@ enum class InertialIntegration { kExact = 0, kEuler = 2, kMidpoint = 3 };
 ///              midpoint   Y_1 = Y_2 = Exp(phi/2): the orientation in the middle of the step
 ///              b_omega, b_f are model parameter states, known to be 0 unless the config defines
 ///              initial values
-///   noise      continuous: w = (w_omega, w_f) ~ N(0, diag(sigma_omega^2, sigma_f^2) / dt), white
+///   noise      continuous: (w_omega, w_f) ~ N(0, diag(sigma_omega^2, sigma_f^2) / dt), white
+///              noise of the readings; (w_1, w_2) ~ N(0, diag(sigma_1^2, sigma_2^2) dt), random
+///              walks of the biases
 ///   Jacobian   automatic differentiation               15 x 15; exact at phi = 0
 ///
 ///   symbol       shape  unit       frame  meaning
@@ -36,12 +38,15 @@ enum class InertialIntegration { kExact = 0, kEuler = 2, kMidpoint = 3 };
 ///                                         spectral density (angle random walk); >= 0
 ///   sigma_f      3      m/s^1.5    body   noise of the accelerometer for each axis, the root of
 ///                                         its spectral density (velocity random walk); >= 0
+///   sigma_1      1      rad/s^1.5  body   standard deviation of the change of b_omega in one
+///                                         second; >= 0
+///   sigma_2      1      m/s^2.5    body   the same of b_f; >= 0
 ///
 /// Defined everywhere. The world does not rotate. Steps without noise are exact, or of the declared
 /// order in dt. The noise of r is correct to first order in dt.
 /// Source       [Sola2017] sec. 5.4 (Euler's method); Gamma_1, Gamma_2: [Hartley2020] sec. 3.4.
 template <InertialIntegration kIntegration = InertialIntegration::kExact>
-struct Inertial : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>, Vec<3>> {
+struct Inertial : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>, Vec<3>> {
   static constexpr std::array kBlocks{
       Quantity{"position", "m", "position of the body in the world", "x,y,z"},
       Quantity{"orientation", "", "orientation of the body, world_from_body", "w,x,y,z"},
@@ -58,12 +63,16 @@ struct Inertial : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>, Vec<3>> {
 
   InputNoise<6> noise;
   std::array<double, 3> gravity;
+  double gyro_bias_walk, accelerometer_bias_walk;
 
   Inertial(const std::array<double, 3>& gyro, const std::array<double, 3>& accelerometer,
-           const std::array<double, 3>& gravity_m_s2 = {0.0, 0.0, -9.80665})
+           const std::array<double, 3>& gravity_m_s2 = {0.0, 0.0, -9.80665}, double gyro_bias = 0.0,
+           double accelerometer_bias = 0.0)
       : noise{NoiseKind::kContinuous,
               {gyro[0], gyro[1], gyro[2], accelerometer[0], accelerometer[1], accelerometer[2]}},
-        gravity(gravity_m_s2) {}
+        gravity(gravity_m_s2),
+        gyro_bias_walk(gyro_bias),
+        accelerometer_bias_walk(accelerometer_bias) {}
   explicit Inertial(Params& p)
       : Inertial(
             p.PerAxis<3>("noise.gyro", "rad/s^0.5",
@@ -71,7 +80,11 @@ struct Inertial : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>, Vec<3>> {
             p.PerAxis<3>("noise.accelerometer", "m/s^1.5",
                          "root of the spectral density of the accelerometer's noise", kNonNegative),
             p.Vector<3>("gravity", "m/s^2", "acceleration of gravity in the world", {},
-                        std::array<double, 3>{0.0, 0.0, -9.80665})) {}
+                        std::array<double, 3>{0.0, 0.0, -9.80665}),
+            p.NonNegative("noise.gyro_bias", "rad/s^1.5",
+                          "standard deviation of the change of the bias in one second", 0.0),
+            p.NonNegative("noise.accelerometer_bias", "m/s^2.5",
+                          "standard deviation of the change of the bias in one second", 0.0)) {}
 
   template <class T>
   void Step(const T* r, const T* q, const T* v, const T* gyro_bias, const T* accelerometer_bias,
@@ -88,12 +101,17 @@ struct Inertial : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>, Vec<3>> {
     for (std::size_t i = 0; i < 3; ++i) {
       r1[i] = r[i] + dt_s * v[i] + 0.5 * dt_s * dt_s * (shift[i] + gravity[i]);
       v1[i] = v[i] + dt_s * (velocity_change[i] + gravity[i]);
-      gyro_bias1[i] = gyro_bias[i];
-      accelerometer_bias1[i] = accelerometer_bias[i];
+      gyro_bias1[i] = gyro_bias[i] + w[6 + i];
+      accelerometer_bias1[i] = accelerometer_bias[i] + w[9 + i];
     }
     UnitQuaternion::Plus(q, turn, q1);
   }
-  void SqrtQ(double dt_s, MatrixRef l) const { noise.SqrtQ(dt_s, l); }
+  void SqrtQ(double dt_s, MatrixRef l) const {
+    noise.SqrtQ(dt_s, l);
+    for (int i = 6; i < 12; ++i) {
+      l(i, i) = (i < 9 ? gyro_bias_walk : accelerometer_bias_walk) * std::sqrt(dt_s);
+    }
+  }
 
  private:
   /// Computes y_1 = Y_1 f and y_2 = Y_2 f in the frame of the body at the start of the step.

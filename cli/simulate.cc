@@ -20,10 +20,10 @@ constexpr const char* kSimulateFooter = R"(Examples:
   alidade run other.yaml --set source.path=data/scene   if source.type is tracks
 
 No estimator runs. STREAM.csv contains the measurements of a stream. Its columns are
-frame,feature,dim,value for landmarks, and frame,t_s and the values for other measurements. The
-folder also contains timestamps.csv, truth, map.csv and calibration.yaml. Images show the textured
-surfaces of the source. Without surfaces, images show an equal disc at each measured pixel. The
-images of a stereo pair are in DIR/left and DIR/right.)";
+frame,feature,dim,value for tracks and known. For other streams they are frame,t_s, the landmark
+and the values. The folder also contains timestamps.csv, truth, map.csv and calibration.yaml. Images
+show the textured surfaces of the source. Without surfaces, images show an equal disc at each
+measured pixel. The images of a stereo pair are in DIR/left and DIR/right.)";
 
 struct SimulateArguments {
   Input input;

@@ -2,7 +2,11 @@
 //
 // Tests that the memory of a run does not grow with the length of the run. The configs are those of
 // bench/long_run.
+#include <sys/stat.h>
+
 #include <algorithm>
+#include <cstdlib>
+#include <thread>
 
 #include "support/program.h"
 #include "support/sanitized.h"
@@ -84,6 +88,37 @@ TEST_F(LongRun, MemoryDoesNotGrowWithTheTable) {
   // row, or 6 MB in total.
   const long shorter = peak(120'000), longer = peak(520'000);
   EXPECT_LT(longer - shorter, 2'048) << shorter << " KiB, then " << longer;
+}
+
+// Two pipes are merged by time. ALIDADE_PIPE_GB is the size of their text, by default 0.2 GB.
+// PeakOf() expects less than 100 MiB, for any size.
+TEST_F(LongRun, GigabytesThroughPipesNeedNoMoreMemory) {
+  if (kSanitized) GTEST_SKIP() << "the sanitizer does not return freed memory to the heap";
+  const char* const size_gb = std::getenv("ALIDADE_PIPE_GB");
+  const double bytes = 1e9 * (size_gb == nullptr ? 0.2 : std::stod(size_gb));
+  const std::string ballast(4'000, ';');  // 4001 columns that the config does not name
+  const auto rows = static_cast<long>(bytes / 2.0 / static_cast<double>(ballast.size() + 20));
+  const auto writer_of = [&](const char* name, const std::string& offset) {
+    const fs::path pipe = folder_ / name;
+    EXPECT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    return std::thread([=] {
+      std::ofstream out(pipe);
+      out << "t_s;d" << ballast << '\n';
+      for (long k = 0; k < rows; ++k) out << k << offset << 80 + k % 7 << ballast << '\n';
+    });
+  };
+  std::thread first = writer_of("first", ".0;"), second = writer_of("second", ".5;");
+  const auto table = [&](const char* name, const char* stream) {
+    return std::string("{path: ") + name + ", streams: {" + stream +
+           ": {columns: d, delay_s: 20}}}";
+  };
+  const long peak = PeakOf(
+      "table.yaml", {"source={type: tables, path: " + folder_.path().string() + ", files: [" +
+                     table("first", "disparity") + ", " + table("second", "other") + "]}"});
+  first.join();
+  second.join();
+  EXPECT_GT(peak, 0);
+  EXPECT_EQ(Json("out/run.json").root().At("frames").Number(), 2 * rows);
 }
 
 TEST_F(LongRun, MemoryDoesNotGrowAsLandmarksComeAndGo) {

@@ -34,7 +34,7 @@ std::unique_ptr<Source> MakeSource(const Config& config, const PluginHost& host)
   return source;
 }
 
-/// Returns the column names of a stream without landmarks.
+/// Returns the names of the columns with the values of a stream.
 std::vector<std::string> ColumnsOf(const StreamInfo& stream) {
   if (stream.name == "odometry" && stream.size == 6) {  // names that source `tracks` expects
     return {"vx_m_s", "vy_m_s", "vz_m_s", "wx_rad_s", "wy_rad_s", "wz_rad_s"};
@@ -97,25 +97,28 @@ class DataFiles {
   void AddRow(std::int64_t number, const Measurement& measurement) {
     const auto index = static_cast<std::size_t>(measurement.stream);
     const StreamInfo& stream = source_.streams()[index];
-    const bool landmark = measurement.landmark >= 0;
+    const bool is_landmark = measurement.landmark >= 0;
+    const bool has_track_rows = is_landmark && (stream.name == "tracks" || stream.name == "known");
     std::optional<CsvFile>& file = streams_[index];
     if (!file) {
       std::vector<std::string> header{"frame", "feature", "dim", "value"};
-      if (!landmark) {
+      if (!has_track_rows) {
         header = {"frame", "t_s"};
+        if (is_landmark) header.emplace_back("landmark");
         for (const std::string& name : ColumnsOf(stream)) header.push_back(name);
         for (int i = 0; i < stream.known; ++i) header.push_back("known" + std::to_string(i));
       }
       OpenCsv(file, stream.name + ".csv", header);
     }
-    if (!landmark) {
+    if (is_landmark) measured_ids_.insert(measurement.landmark);
+    if (!has_track_rows) {
       file->Integer(number).Time(measurement.timestamp);
+      if (is_landmark) file->Landmark(measurement.landmark);
       file->Numbers(measurement.values.data(), measurement.values.size(),
                     measurement.values.size());
       file->Numbers(measurement.known.data(), measurement.known.size(), measurement.known.size());
       return file->EndRow();
     }
-    measured_ids_.insert(measurement.landmark);
     for (std::size_t dim = 0; dim < measurement.values.size(); ++dim) {
       file->Integer(number).Integer(measurement.landmark);
       file->Integer(static_cast<std::int64_t>(dim)).Number(measurement.values[dim]).EndRow();

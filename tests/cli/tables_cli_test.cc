@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Tests that the source tables reads the files that the program writes.
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+using testing::Outcome;
+
+class TablesCli : public testing::ProgramTest {
+ protected:
+  /// Runs `config` with the given source, and returns the estimates.
+  std::string Estimates(const std::string& config, const std::string& folder,
+                        const std::string& source = "") {
+    testing::Arguments arguments = {"run", config, "-o", folder};
+    if (!source.empty()) arguments.insert(arguments.end(), {"--set", "source=" + source});
+    const Outcome run = Call(arguments);
+    EXPECT_EQ(run.code, 0) << run.err;
+    return Read(folder + "/ekf/estimates.csv");
+  }
+};
+
+TEST_F(TablesCli, ReadsTheStreamsAndTheTruthOfASimulation) {
+  const std::string direct = Estimates("config.yaml", "direct");
+  ASSERT_EQ(Call({"simulate", "config.yaml", "-o", "data"}).code, 0);
+  EXPECT_EQ(Estimates("config.yaml", "tables",
+                      "{type: tables, path: data, files: ["
+                      "{path: disparity.csv, streams: {disparity: disparity}}, "
+                      "{path: inverse_scale.csv, streams: {inverse_scale: inverse_scale}}, "
+                      "{path: truth.csv, truth: {depth: depth, depth_rate: depth_rate, "
+                      "inverse_distance: inverse_distance}}]}"),
+            direct);
+  EXPECT_EQ(Read("tables/ekf/errors.csv"), Read("direct/ekf/errors.csv"));
+}
+
+TEST_F(TablesCli, ReadsTheMeasurementsOfARun) {
+  const std::string direct = Estimates("config.yaml", "direct");
+  EXPECT_EQ(Estimates("config.yaml", "tables",
+                      "{type: tables, path: direct/measurements.csv, time: {repeats: true}, "
+                      "streams: {disparity: {columns: v0, rows: {stream: disparity}}, "
+                      "inverse_scale: {columns: v0, rows: {stream: inverse_scale}}}}"),
+            direct);
+}
+
+TEST_F(TablesCli, ReadsLandmarksWithTheirIds) {
+  fs::copy_file(ALIDADE_SOURCE_DIR "/examples/22_range_bearing/config.yaml",
+                folder_ / "laser.yaml");
+  const std::string direct = Estimates("laser.yaml", "direct");
+  ASSERT_EQ(Call({"simulate", "laser.yaml", "-o", "data"}).code, 0);
+  EXPECT_EQ(Estimates("laser.yaml", "simulated",
+                      "{type: tables, path: data/posts.csv, time: {repeats: true}, streams: "
+                      "{posts: {columns: [posts_0, posts_1, posts_2, posts_3], landmark: "
+                      "landmark}}}"),
+            direct);
+  EXPECT_EQ(Estimates("laser.yaml", "measured",
+                      "{type: tables, path: direct/measurements.csv, time: {repeats: true}, "
+                      "streams: {posts: {columns: [v0, v1, v2, v3], landmark: landmark}}}"),
+            direct);
+}
+
+TEST_F(TablesCli, OutputsDoNotReplaceTheFilesOfTheSource) {
+  Write("log.csv", "t_s,d\n0,80\n");
+  const std::string before = Read("log.csv");
+  Write("files.yaml", testing::kTargetConfig + testing::kStereoConfig +
+                          "source: {type: tables, files: [{path: log.csv, streams: {disparity: "
+                          "d}}]}\nestimators: {ekf: {type: ekf}}\n");
+  const Outcome run = Call({"run", "files.yaml", "-o", "log.csv", "--force"});
+  EXPECT_NE(run.code, 0);
+  EXPECT_EQ(Read("log.csv"), before);
+  ASSERT_EQ(Call({"run", "files.yaml", "-o", "out"}).code, 0);
+  EXPECT_NE(Read("out/inputs.json").find("/log.csv\", \"bytes\": 11"), std::string::npos)
+      << Read("out/inputs.json");
+}
+
+// The paths of files are relative to the config, and `source.path` replaces their folder.
+TEST_F(TablesCli, ThePathOfTheSourceReplacesTheFolderOfItsFiles) {
+  Write("log.csv", "t_s,d\n0,80\n");
+  fs::create_directory(folder_ / "parts");
+  fs::create_directory(folder_ / "other");
+  Write("other/log.csv", "t_s,d\n0,80\n1,81\n");
+  Write("parts/log.csv", "t_s,d\n0,80\n1,81\n2,82\n");
+  Write("parts/source.yaml",
+        "source: {type: tables, files: [{path: log.csv, streams: {disparity: d}}]}\n");
+  Write("files.yaml", "include: parts/source.yaml\n" + testing::kTargetConfig +
+                          testing::kStereoConfig + "estimators: {ekf: {type: ekf}}\n");
+  const auto frames = [&](const testing::Arguments& settings) {
+    testing::Arguments arguments = {"run", "files.yaml", "-o", "out", "--force"};
+    arguments.insert(arguments.end(), settings.begin(), settings.end());
+    const Outcome run = Call(arguments);
+    EXPECT_EQ(run.code, 0) << run.err;
+    return Json("out/run.json").root().At("frames").Number();
+  };
+  EXPECT_EQ(frames({}), 3);
+  EXPECT_EQ(frames({"--set", "source.path=other"}), 2);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -85,9 +85,11 @@ TEST(Examples, EveryExampleRuns) {
   for (const auto& entry : std::filesystem::directory_iterator(kExamples)) {
     if (!std::filesystem::exists(entry.path() / "config.yaml")) continue;
     if (!kHasCeres && entry.path().filename() == "08_depth_all_estimators") continue;
-    // The recorded drives are not in this repository. SlamOdometryTracks and SlamStereoTracks test
-    // these examples.
-    if (entry.path().filename().string().ends_with("_tracks")) continue;
+    // The recordings are not in this repository. SlamOdometryTracks, SlamStereoTracks and
+    // RecordedRobots test these examples.
+    const std::string name = entry.path().filename().string();
+    const auto is_recorded = [&](const char* ending) { return name.ends_with(ending); };
+    if (is_recorded("_tracks") || is_recorded("_files") || is_recorded("_ranges")) continue;
     // These examples need rendered images.
     if (entry.path().filename().string().ends_with("_images")) continue;
     ++count;

@@ -14,6 +14,7 @@
 namespace alidade {
 namespace {
 
+namespace fs = std::filesystem;
 using testing::kSanitized;
 
 const std::string kBench = ALIDADE_SOURCE_DIR "/bench/long_run/";
@@ -112,9 +113,9 @@ TEST_F(LongRun, GigabytesThroughPipesNeedNoMoreMemory) {
     return std::string("{path: ") + name + ", streams: {" + stream +
            ": {columns: d, delay_s: 20}}}";
   };
-  const long peak = PeakOf(
-      "table.yaml", {"source={type: tables, path: " + folder_.path().string() + ", files: [" +
-                     table("first", "disparity") + ", " + table("second", "other") + "]}"});
+  const long peak =
+      PeakOf("table.yaml", {"source={type: tables, path: " + folder_.string() + ", files: [" +
+                            table("first", "disparity") + ", " + table("second", "other") + "]}"});
   first.join();
   second.join();
   EXPECT_GT(peak, 0);

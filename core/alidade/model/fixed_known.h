@@ -17,8 +17,11 @@ namespace alidade {
 /// base `Model` declares known numbers, which accompany each measurement, and
 ///
 ///   static constexpr const char* kFixedKey;              key of the parameter
+template <class Model, bool kHasValid = detail::HasValid<Model>::value>
+struct FixedKnown;
+
 template <class Model>
-struct FixedKnown : Model {
+struct FixedKnown<Model, false> : Model {
   static constexpr int kSize = Model::Known::kAmbient;
   static constexpr std::size_t kArguments = std::tuple_size<typename Model::Spaces>::value + 1;
   using Known = Vec<0>;
@@ -57,6 +60,14 @@ struct FixedKnown : Model {
   auto Insert(const F& f, const Arguments& arguments, std::index_sequence<I...>) const {
     return f(std::get<I>(arguments)..., fixed.data(), std::get<sizeof...(I)>(arguments));
   }
+};
+
+template <class Model>
+struct FixedKnown<Model, true> : FixedKnown<Model, false> {
+  using FixedKnown<Model, false>::FixedKnown;
+
+  /// Calls the function of Model with the fixed numbers.
+  bool Valid(const double* z) const { return Model::Valid(this->fixed.data(), z); }
 };
 
 /// Creates FixedKnown<Model> if the config contains the key of the fixed numbers, otherwise Model.

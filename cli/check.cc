@@ -135,6 +135,18 @@ bool CheckAllAndPrint(const std::vector<PluginEntry>& entries, const Config& con
   return failed;
 }
 
+/// Checks the formulas in the config of a run, and prints the findings. Returns true if a check
+/// failed.
+bool CheckFormulasAndPrint(const Config& config, const PluginHost& host,
+                           const CheckOptions& options) {
+  bool failed = false;
+  for (const FormulaCheck& check : CheckFormulas(config, host, options)) {
+    PrintText(check.path + ": " + CheckText(check.entry, check.findings));
+    failed = AnyFailure(check.findings) || failed;
+  }
+  return failed;
+}
+
 ExitCode Check(const CheckArguments& arguments) {
   std::optional<Config> config;
   std::vector<fs::path> places;
@@ -145,6 +157,14 @@ ExitCode Check(const CheckArguments& arguments) {
   }
   for (const fs::path& path : Absolute(arguments.plugin_paths)) places.push_back(path);
   const PluginHost host(places);
+  if (arguments.plugin == "formula") {
+    if (!config) {
+      throw Error(ExitCode::kUsage,
+                  ErrorLine({}, {}, "the equations of a formula are in a config", "--config FILE"));
+    }
+    return CheckFormulasAndPrint(*config, host, arguments.options) ? ExitCode::kFound
+                                                                   : ExitCode::kOk;
+  }
   const auto entries = FindModels(host, arguments.plugin, arguments.model);
   const bool failed = config ? CheckAllAndPrint(entries, *config, arguments.options)
                              : CheckAllAndPrint(entries, arguments);

@@ -17,6 +17,7 @@
 #include "alidade/experiment/defect_node.h"
 #include "alidade/experiment/read_landmarks.h"
 #include "alidade/formula/formula_motion.h"
+#include "alidade/formula/formula_name.h"
 #include "alidade/formula/formula_sensor.h"
 #include "alidade/state/element_names.h"
 #include "alidade/state/quaternion_sign.h"
@@ -24,10 +25,8 @@
 namespace alidade {
 namespace {
 
+using internal::kFormula;
 using internal::NamesOf;
-
-/// Model whose equations are expressions in its config entry. It is part of the program.
-constexpr const char* kFormula = "formula";
 
 /// Calls `add`. If `add` throws, throws the error again with the place of the entry.
 template <class Add>

@@ -124,8 +124,8 @@ CompiledFunction::CompiledFunction(std::vector<Geometry> inputs, const Node& own
 
 void CompiledFunction::AddOutput(const Geometry& geometry, const Value& value, const Node& owner) {
   outputs_.push_back(geometry);
-  nodes_.insert(nodes_.end(), value.nodes.begin(), value.nodes.end());
-  ExpectAtMost(static_cast<int>(nodes_.size()), "results", owner);
+  for (const int node : value.nodes) sweeps_.push_back(program_.SweepFrom(node));
+  ExpectAtMost(static_cast<int>(sweeps_.size()), "results", owner);
   if (program_.size() <= Program::kMaxNodes) return;
   owner.Fail("the formula has too many operations",
              "at most " + std::to_string(Program::kMaxNodes));
@@ -142,12 +142,13 @@ bool CompiledFunction::EvaluateAmbient(const double* x, double* y, double* jacob
     const double value = tape.value[condition.node];
     if (!(condition.accepts_zero ? value >= 0.0 : value > 0.0)) return false;
   }
-  const int count = static_cast<int>(nodes_.size()), columns = program_.variables();
-  for (int i = 0; i < count; ++i) y[i] = tape.value[nodes_[static_cast<std::size_t>(i)]];
-  if (jacobian == nullptr) return true;
+  const int count = static_cast<int>(sweeps_.size()), columns = program_.variables();
   for (int i = 0; i < count; ++i) {
-    program_.Gradient(nodes_[static_cast<std::size_t>(i)], tape, jacobian + i * columns);
+    const Program::Sweep& sweep = sweeps_[static_cast<std::size_t>(i)];
+    y[i] = tape.value[sweep.front()];
+    if (jacobian != nullptr) program_.Gradient(sweep, tape, jacobian + i * columns);
   }
+  if (jacobian == nullptr) return true;
   return std::all_of(jacobian, jacobian + count * columns,
                      [](double slope) { return std::isfinite(slope); });
 }

@@ -35,7 +35,8 @@ class CompiledFunction {
   /// Returns the first variable of an input.
   int offset(std::size_t input) const { return offsets_[input]; }
   const std::vector<Geometry>& inputs() const { return inputs_; }
-  const std::vector<int>& nodes() const { return nodes_; }
+  /// Returns the nodes on which each element of the outputs depends.
+  const std::vector<Program::Sweep>& sweeps() const { return sweeps_; }
 
   /// Appends an output. `owner` is the expression that messages report.
   void AddOutput(const Geometry& geometry, const Value& value, const Node& owner);
@@ -54,7 +55,7 @@ class CompiledFunction {
   std::vector<Geometry> inputs_, outputs_;
   std::vector<int> offsets_;
   Program program_;
-  std::vector<int> nodes_;
+  std::vector<Program::Sweep> sweeps_;  ///< one for each element of the outputs
   std::vector<Condition> conditions_;
 };
 

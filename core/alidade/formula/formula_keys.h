@@ -8,6 +8,7 @@
 
 #include "alidade/config/config.h"
 #include "alidade/formula/compiled_function.h"
+#include "alidade/formula/formula_name.h"
 
 namespace alidade::internal {
 

@@ -55,22 +55,26 @@ class FormulaMotion final : public MotionModel {
   Status EvaluateStep(const double* const* block_values, const double* input, const double* w,
                       double dt_s, double* next, const Output& out) const {
     const std::size_t count = blocks().size();
-    std::array<const double*, kMaxInputs> inputs{};
-    std::array<double*, kMaxInputs> jacobians{};
-    std::array<int, kMaxInputs> strides{};
+    std::array<const double*, kMaxInputs> inputs;  // only the used elements are initialised
+    std::array<double*, kMaxInputs> jacobians;
+    std::array<int, kMaxInputs> strides;
     int column = 0;
     for (std::size_t k = 0; k < count; ++k) {
       inputs[k] = block_values[k];
-      if (out.f != nullptr) jacobians[k] = out.f + column;
+      jacobians[k] = out.f == nullptr ? nullptr : out.f + column;
       strides[k] = tangent_size();
       column += blocks()[k].geometry.tangent;
     }
     std::size_t k = count;
-    if (has_input()) inputs[k++] = input;
+    if (has_input()) {
+      inputs[k] = input;
+      jacobians[k++] = nullptr;
+    }
     inputs[k] = w;
     jacobians[k] = out.g;
     strides[k++] = noise_size();
     inputs[k] = &dt_s;
+    jacobians[k] = nullptr;
     const bool has_jacobians = out.f != nullptr || out.g != nullptr;
     return step_->Evaluate(inputs.data(), next, has_jacobians ? jacobians.data() : nullptr,
                            strides.data());
@@ -80,7 +84,7 @@ class FormulaMotion final : public MotionModel {
   /// by the root of dt.
   Status EvaluateNoise(const double* const* block_values, const double* input, double dt_s,
                        double* sqrt_q) const {
-    std::array<const double*, kMaxInputs> inputs{};
+    std::array<const double*, kMaxInputs> inputs;
     std::copy_n(block_values, blocks().size(), inputs.begin());
     inputs[blocks().size()] = input;
     double sigma[CompiledFunction::kMaxElements];
@@ -134,7 +138,7 @@ class MotionReader {
       parts.step = std::move(function);
     }
     MotionModel::Description& description = parts.description;
-    description.name = "formula";
+    description.name = kFormula;
     description.blocks = blocks_;
     description.input = input_space_;
     description.noise_size = static_cast<int>(noises_.size()) * terms;

@@ -147,8 +147,6 @@ class SensorReader {
   }
 
  private:
-  static constexpr const char* kFormula = "formula";
-
   Space ReadLandmark() const {
     const auto node = entry_.Find(kLandmark);
     Space role;

@@ -122,7 +122,7 @@ bool ComputeFunction(Op op, double x, double y, Result& r) {
 
 /// Computes an operation that is neither a variable nor a constant. Returns false if the value or a
 /// derivative is not defined.
-bool Compute(Op op, double x, double y, Result& r) {
+inline bool Compute(Op op, double x, double y, Result& r) {
   switch (op) {
     case Op::kAdd:
       r = {x + y, 1.0, 1.0};
@@ -191,48 +191,52 @@ std::optional<double> Program::ConstantValue(int node) const {
   return n.op == Op::kConstant ? std::optional(n.value) : std::nullopt;
 }
 
-std::vector<bool> Program::DependenciesOf(int node) const {
+Program::Sweep Program::SweepFrom(int node) const {
   std::vector<bool> is_used(nodes_.size());
   is_used[static_cast<std::size_t>(node)] = true;
-  for (auto i = static_cast<std::size_t>(node) + 1; i-- > 0;) {
-    if (!is_used[i]) continue;
-    if (nodes_[i].x >= 0) is_used[static_cast<std::size_t>(nodes_[i].x)] = true;
-    if (nodes_[i].y >= 0) is_used[static_cast<std::size_t>(nodes_[i].y)] = true;
+  Sweep sweep;
+  for (int i = node; i >= 0; --i) {
+    if (!is_used[static_cast<std::size_t>(i)]) continue;
+    sweep.push_back(i);
+    const Node& n = nodes_[static_cast<std::size_t>(i)];
+    for (const int operand : {n.x, n.y})
+      if (operand >= 0) is_used[static_cast<std::size_t>(operand)] = true;
   }
-  is_used.resize(static_cast<std::size_t>(variables_));
-  return is_used;
+  return sweep;
 }
 
 bool Program::Evaluate(const double* x, bool with_slopes, Tape& tape) const {
   std::copy_n(x, variables_, tape.value);
   const int count = size();
-  Result result;
+  double undefined = 0.0;  // NaN as soon as a value is not finite
   for (int i = variables_; i < count; ++i) {
     const Node& node = nodes_[static_cast<std::size_t>(i)];
     if (node.op == Op::kConstant) {
       tape.value[i] = node.value;
       continue;
     }
+    Result result;
     const double second = node.y < 0 ? 0.0 : tape.value[node.y];
     if (!Compute(node.op, tape.value[node.x], second, result)) return false;
-    if (!std::isfinite(result.value)) return false;
+    undefined += 0.0 * result.value;
     tape.value[i] = result.value;
     if (!with_slopes) continue;
     tape.slope[i][0] = result.x;
     tape.slope[i][1] = result.y;
   }
-  return true;
+  return undefined == 0.0;
 }
 
-void Program::Gradient(int node, Tape& tape, double* gradient) const {
-  std::fill_n(tape.adjoint, std::max(node + 1, variables_), 0.0);
-  tape.adjoint[node] = 1.0;
-  for (int i = node; i >= variables_; --i) {
+void Program::Gradient(const Sweep& sweep, Tape& tape, double* gradient) const {
+  std::fill_n(tape.adjoint, variables_, 0.0);
+  for (const int i : sweep) tape.adjoint[i] = 0.0;
+  tape.adjoint[sweep.front()] = 1.0;
+  for (const int i : sweep) {
+    const Node& node = nodes_[static_cast<std::size_t>(i)];
+    if (node.x < 0) continue;
     const double adjoint = tape.adjoint[i];
-    const Node& n = nodes_[static_cast<std::size_t>(i)];
-    if (adjoint == 0.0 || n.x < 0) continue;
-    tape.adjoint[n.x] += adjoint * tape.slope[i][0];
-    if (n.y >= 0) tape.adjoint[n.y] += adjoint * tape.slope[i][1];
+    tape.adjoint[node.x] += adjoint * tape.slope[i][0];
+    if (node.y >= 0) tape.adjoint[node.y] += adjoint * tape.slope[i][1];
   }
   std::copy_n(tape.adjoint, variables_, gradient);
 }

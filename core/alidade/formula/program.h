@@ -53,6 +53,9 @@ class Program {
     double adjoint[kMaxNodes];
   };
 
+  /// Nodes in the order of a reverse sweep.
+  using Sweep = std::vector<int>;
+
   /// The nodes 0 to `variables` - 1 are the variables.
   explicit Program(int variables);
 
@@ -63,14 +66,15 @@ class Program {
   int Add(Op op, int x, int y = -1);
   /// Returns the value of a node that is a constant.
   std::optional<double> ConstantValue(int node) const;
-  /// Returns for each variable whether `node` depends on it.
-  std::vector<bool> DependenciesOf(int node) const;
+  /// Returns `node` and all nodes on which it depends, in descending order.
+  Sweep SweepFrom(int node) const;
 
   /// Computes all nodes. Returns false if a node, or its derivative, is not defined. Slopes are
   /// computed only if `with_slopes` is true.
   bool Evaluate(const double* x, bool with_slopes, Tape& tape) const;
-  /// Computes the gradient of `node` with respect to the variables, from a tape with slopes.
-  void Gradient(int node, Tape& tape, double* gradient) const;
+  /// Computes the gradient of the first node of `sweep` with respect to the variables, from a tape
+  /// with slopes.
+  void Gradient(const Sweep& sweep, Tape& tape, double* gradient) const;
 
  private:
   struct Node {

@@ -60,16 +60,17 @@ RateIntegrator::RateIntegrator(CompiledFunction rate, const std::vector<Space>& 
 
 int RateIntegrator::CountTerms() const {
   const auto n = static_cast<std::size_t>(states_);
-  std::vector<std::vector<bool>> dependencies;
-  for (const int node : rate_.nodes()) dependencies.push_back(rate_.program().DependenciesOf(node));
   std::vector<int> integrators(n, 0);  // between a noise and each element
-  const auto first_noise = static_cast<std::ptrdiff_t>(n) + inputs_;
+  const int first_noise = states_ + inputs_;
   for (int round = 0; round < kMaxTerms; ++round) {
     for (std::size_t i = 0; i < n; ++i) {
-      const auto begin = dependencies[i].begin() + first_noise;
-      int count = std::any_of(begin, begin + noises_, [](bool used) { return used; }) ? 1 : 0;
-      for (std::size_t j = 0; j < n; ++j) {
-        if (dependencies[i][j] && integrators[j] > 0) count = std::max(count, integrators[j] + 1);
+      int count = 0;
+      for (const int node : rate_.sweeps()[i]) {
+        const bool is_noise = node >= first_noise && node < first_noise + noises_;
+        if (is_noise) count = std::max(count, 1);
+        if (node >= states_) continue;
+        const int before = integrators[static_cast<std::size_t>(node)];
+        if (before > 0) count = std::max(count, before + 1);
       }
       integrators[i] = std::min(count, kMaxTerms);
     }

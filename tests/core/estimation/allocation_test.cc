@@ -10,6 +10,7 @@
 #include "alidade/estimation/ukf.h"
 #include "alidade/io/log.h"
 #include "support/driven.h"
+#include "support/formula_models.h"
 #include "support/landmark_models.h"
 #include "support/sanitized.h"
 #include "support/systems.h"
@@ -52,6 +53,37 @@ TEST(ControlInput, TakesNoAllocation) {
   for (std::size_t k = 0; k < 20; ++k) ekf.Process(frames[k]);
   const long before = allocations;
   for (std::size_t k = 20; k < frames.size(); ++k) ekf.Process(frames[k]);
+  EXPECT_EQ(allocations - before, 0);
+}
+
+TEST(FormulaModels, TakeNoAllocation) {
+  const SharedSensor sensor = testing::FormulaSensorOf(
+      R"yaml(known: {anchor: [x, y, z]}
+z: {range: norm(p - anchor), ray: "unit(unrotate(q, p))"}
+where: p.x > 0
+valid: z.range > 0
+sigma: {range: 0.1 + 0.01 * norm(p), ray: 0.1}
+initialise: {p: "anchor + z.range * rotate(q, z.ray)"}
+)yaml",
+      {testing::VectorSpace("p", 3), testing::NamedSpace("q", Geometry::UnitQuaternion())});
+  const std::string blocks = "blocks: {q: unit_quaternion, w: [x, y, z]}\nnoise: {a: 0.1}\n";
+  const SharedMotion step =
+      testing::FormulaMotionOf(blocks + "step: {q: 'multiply(q, rotation(dt * w + a))'}\n");
+  const SharedMotion rate = testing::FormulaMotionOf(blocks + "rate: {q: w, w: '[a, 0, 0]'}\n");
+  const double p[] = {1, 2, 3}, q[] = {0.5, 0.5, -0.5, 0.5}, known[] = {4, 5, 6};
+  const double z[] = {5, 0, 0.6, 0.8}, w[] = {0.1, 0.2, 0.3};
+  const double *const roles[] = {p, q}, *const values[] = {q, w};
+  double y[8], l[36], first[36], second[36];
+  double *const jacobians[] = {first, second}, *const next[] = {y, y + 4};
+  const int strides[] = {3, 3};
+  const long before = allocations;
+  EXPECT_EQ(sensor->Evaluate({z, known}, roles, {y, jacobians, strides, l}), Status::kOk);
+  EXPECT_EQ(sensor->Valid({z, known}), Status::kOk);
+  EXPECT_EQ(sensor->Initialise(roles, {z, known}, nullptr, {y, jacobians, strides, l}),
+            Status::kOk);
+  for (const SharedMotion& motion : {step, rate}) {
+    EXPECT_EQ(motion->Step(values, nullptr, nullptr, 0.1, {next, first, second, l}), Status::kOk);
+  }
   EXPECT_EQ(allocations - before, 0);
 }
 

@@ -207,7 +207,7 @@ TEST(SparseBatch, SolvesOnManifolds) {
 
 TEST(SparseBatch, SolvesTheExamplesWithoutAMap) {
   for (const char* name : {"05_depth_principled", "08_depth_all_estimators", "21_poses",
-                           "22_range_bearing", "23_satellites"}) {
+                           "22_range_bearing", "23_satellites", "33_formula_models"}) {
     SCOPED_TRACE(name);
     const Both both = SolveBoth(Example(name), 40);
     ExpectSame(both.sparse, both.dense);

@@ -9,9 +9,13 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/text.h"
 #include "alidade/check/check_context.h"
+#include "alidade/check/model_export.h"
 #include "alidade/check/plugin_listing.h"
 #include "alidade/experiment/estimator_registry.h"
+#include "alidade/experiment/read_problem.h"
+#include "alidade/formula/formula_name.h"
 #include "alidade/io/text_table.h"
+#include "alidade/plugin/create.h"
 
 namespace alidade {
 namespace fs = std::filesystem;
@@ -56,12 +60,12 @@ std::string EndText(const ChildEnd& end, const internal::CallRecord& record, dou
 }
 
 /// Runs one check in a child process. Sets `ended` if the child ended without an answer.
-CheckResult RunCheck(const Check& check, const PluginEntry& entry, const Node& parameters,
-                     const CheckOptions& options, bool& ended) {
+CheckResult RunCheck(const Check& check, const ModelCreator& create, const CheckOptions& options,
+                     bool& ended) {
   internal::CallRecord record;
   const auto work = [&]() -> std::string {
     try {
-      Context context(entry, parameters, options, record);
+      Context context(create, options, record);
       const CheckResult finding = check.run(context);
       context.Close();
       return Encode(finding);
@@ -93,16 +97,15 @@ CheckResult RunCheck(const Check& check, const PluginEntry& entry, const Node& p
 
 }  // namespace
 
-std::vector<CheckResult> CheckModel(const PluginEntry& entry, const Node& parameters,
-                                    const CheckOptions& options) {
-  ALIDADE_EXPECTS(entry.is_model() && options.states > 0 && options.timeout_s > 0.0);
+std::vector<CheckResult> CheckModel(const ModelCreator& create, const CheckOptions& options) {
+  ALIDADE_EXPECTS(options.states > 0 && options.timeout_s > 0.0);
   std::vector<CheckResult> findings;
   std::string stopped_by;
   for (const Check& check : internal::kChecks) {
     CheckResult finding = internal::Skip("'" + stopped_by + "' failed");
     if (stopped_by.empty()) {
       bool ended = false;
-      finding = RunCheck(check, entry, parameters, options, ended);
+      finding = RunCheck(check, create, options, ended);
       const bool failed = finding.verdict == CheckResult::Verdict::kFail;
       if (failed && (check.needed || ended)) stopped_by = check.name;
     }
@@ -110,6 +113,46 @@ std::vector<CheckResult> CheckModel(const PluginEntry& entry, const Node& parame
     findings.push_back(std::move(finding));
   }
   return findings;
+}
+
+std::vector<CheckResult> CheckModel(const PluginEntry& entry, const Node& parameters,
+                                    const CheckOptions& options) {
+  ALIDADE_EXPECTS(entry.is_model());
+  const auto create = [&] {
+    auto instance = CreateModel(entry, parameters);
+    if (!options.allows_unread_keys) parameters.RejectUnread();
+    return instance;
+  };
+  return CheckModel(create, options);
+}
+
+std::vector<FormulaCheck> CheckFormulas(const Config& config, const PluginHost& host,
+                                        const CheckOptions& options) {
+  constexpr unsigned kRungeKuttaOrder = 5;  // the error of a step of the Runge-Kutta method
+  const Problem problem = ReadProblem(config.root(), host, {});
+  std::vector<FormulaCheck> checks;
+  const auto add = [&](const char* kind, const std::string& path, const auto& create) {
+    PluginEntry entry;
+    entry.kind = kind;
+    entry.name = internal::kFormula;
+    entry.plugin = config.name();
+    checks.push_back({std::move(entry), path, CheckModel(create, options)});
+  };
+  for (const MotionBinding& motion : problem.motions) {
+    if (motion.model->name() != internal::kFormula) continue;
+    const bool is_rate = config.root().At("state").At(motion.name).Find("rate").has_value();
+    add(kMotionKind, "state." + motion.name,
+        [&] { return internal::ExportModel(motion.model, is_rate ? kRungeKuttaOrder : 0); });
+  }
+  for (const SensorBinding& sensor : problem.sensors) {
+    if (sensor.model->name() != internal::kFormula) continue;
+    add(kSensorKind, "sensors." + sensor.name, [&] { return internal::ExportModel(sensor.model); });
+  }
+  if (checks.empty()) {
+    config.root().Fail("no entry of `state` or `sensors` is a formula",
+                       "an entry with model: formula");
+  }
+  return checks;
 }
 
 std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& plugin,

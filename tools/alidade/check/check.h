@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,6 +12,8 @@
 /// Checks that the models of a plugin obey the rules of plugin_abi.h. Each check runs in a separate
 /// process.
 namespace alidade {
+
+class ModelInstance;  // defined in alidade/plugin/model_instance.h
 
 /// Number of tested states, and resource limits.
 struct CheckOptions {
@@ -34,12 +38,30 @@ struct CheckResult {
   std::string text;   ///< description of the result; a failure includes the call and the state
 };
 
-/// Checks the model that `entry` creates from `parameters`. Each check runs in a child process with
-/// the limits of `options`. The later checks are skipped if a check that they need fails, or if a
-/// child process ends without an answer. docs/check.md lists the checks. Error: kBadConfig if the
-/// parameters are invalid.
+/// Creates an instance of a checked model. Error: kBadConfig.
+using ModelCreator = std::function<std::shared_ptr<const ModelInstance>()>;
+
+/// Checks the model that `create` returns. Each check runs in a child process with the limits of
+/// `options`. The later checks are skipped if a check that they need fails, or if a child process
+/// ends without an answer. docs/check.md lists the checks.
+std::vector<CheckResult> CheckModel(const ModelCreator& create, const CheckOptions& options = {});
+
+/// Checks the model that `entry` creates from `parameters`. Error: kBadConfig if the parameters are
+/// invalid.
 std::vector<CheckResult> CheckModel(const PluginEntry& entry, const Node& parameters,
                                     const CheckOptions& options = {});
+
+/// Checks of one model whose equations are in a config.
+struct FormulaCheck {
+  PluginEntry entry;
+  std::string path;  ///< key path of the config entry, such as `sensors.range`
+  std::vector<CheckResult> findings;
+};
+
+/// Checks all models `formula` of the config of a run. `host` provides the other models. Error:
+/// kBadConfig if the config is invalid, or contains no such model.
+std::vector<FormulaCheck> CheckFormulas(const Config& config, const PluginHost& host,
+                                        const CheckOptions& options = {});
 
 /// Finds sensors and motion models. `plugin` is the path of a plugin file, the name of a file on
 /// the search path, or the name of a model. The name of a file excludes `.so` and may exclude

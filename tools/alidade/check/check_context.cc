@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "alidade/io/log.h"
-#include "alidade/plugin/create.h"
 
 namespace alidade::internal {
 namespace {
@@ -26,9 +25,8 @@ bool Overflows(const CheckedState& state, const Answer& answer) {
 
 }  // namespace
 
-Context::Context(const PluginEntry& entry, const Node& parameters, const CheckOptions& options,
-                 CallRecord& record)
-    : entry_(entry), parameters_(parameters), options_(options), record_(record) {
+Context::Context(const ModelCreator& create, const CheckOptions& options, CallRecord& record)
+    : create_(create), options_(options), record_(record) {
   model_ = Create();
 }
 
@@ -52,7 +50,7 @@ const std::vector<CheckedState>& Context::states() {
 
 std::unique_ptr<ModelUnderTest> Context::Create() const {
   record_.Enter("create");
-  return std::make_unique<ModelUnderTest>(CreateModel(entry_, parameters_));
+  return std::make_unique<ModelUnderTest>(create_());
 }
 
 void Context::Destroy(std::unique_ptr<ModelUnderTest> model) const {

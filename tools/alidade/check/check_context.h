@@ -22,8 +22,7 @@ struct CheckedState {
 /// Context of a check in the child process: the model under test and the tested states.
 class Context {
  public:
-  Context(const PluginEntry& entry, const Node& parameters, const CheckOptions& options,
-          CallRecord& record);
+  Context(const ModelCreator& create, const CheckOptions& options, CallRecord& record);
   /// Records the destruction of the model as a call.
   ~Context() {
     if (model_) record_.Enter("destroy");
@@ -37,8 +36,6 @@ class Context {
   /// Returns Predict of a sensor or Step of a motion model.
   const Function& main() const { return model_->functions.front(); }
 
-  /// Throws kBadConfig if the model does not read one of the given parameters.
-  void RejectUnread() const { parameters_.RejectUnread(); }
   /// Creates another instance with the same parameters.
   std::unique_ptr<ModelUnderTest> Create() const;
   /// Destroys `model` and records the destruction as a call. Error: kPlugin if the destruction
@@ -59,8 +56,7 @@ class Context {
  private:
   std::vector<Space> InputSpaces(const Function& f) const;
 
-  const PluginEntry& entry_;
-  const Node& parameters_;
+  const ModelCreator& create_;
   const CheckOptions& options_;
   CallRecord& record_;
   std::unique_ptr<ModelUnderTest> model_;

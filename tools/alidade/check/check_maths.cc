@@ -270,10 +270,13 @@ CheckResult CheckInitialise(Context& context) {
 }
 
 CheckResult CheckStep(Context& context) {
+  constexpr double kEdge = 1e5;  // the large values of RandomStates() are 1e6
   if (context.model().is_sensor()) return Skip("the model is not a motion model");
   const Function& f = context.main();
   const std::vector<std::string> names = TangentNames(f.outputs);
   const bool stationary = (context.model().instance->capabilities() & ALIDADE_STATIONARY) != 0;
+  const int option = context.options().step_order;
+  const int expected = option > 0 ? option : context.model().instance->step_order();
   WorstDeviation identity, additive;
   double order = 0.0;
   for (const CheckedState& state : context.states()) {
@@ -291,6 +294,8 @@ CheckResult CheckStep(Context& context) {
                                  : "a step over dt = 0 without noise changes the state");
                    });
     }
+    // The order of an approximation is that of small steps, which inputs of 1e6 are not.
+    if (expected > 0 && Largest(inputs) >= kEdge) continue;
     const auto split = TestAdditivity(context, f, inputs, blocks, dt_s);
     if (!split) continue;
     const double previous_ratio = additive.ratio;
@@ -303,8 +308,6 @@ CheckResult CheckStep(Context& context) {
   }
   if (!identity.failure.empty()) return Fail(identity.failure);
   if (additive.failure.empty()) return Ok("Step is additive in dt, and is the identity for dt = 0");
-  const int option = context.options().step_order;
-  const int expected = option > 0 ? option : context.model().instance->step_order();
   if (expected > 0 && order > expected - 0.2) {
     return Ok("Step is additive in dt to order " + RoundedText(order, 2) +
               ", and is the identity for dt = 0");

@@ -10,6 +10,7 @@
 #include "alidade/check/explain_parts.h"
 #include "alidade/estimation/observability.h"
 #include "alidade/experiment/truth_match.h"
+#include "alidade/formula/formula_name.h"
 
 namespace alidade::internal {
 
@@ -95,10 +96,10 @@ void AddConfigNoise(const std::string& name, const std::vector<double>& root, in
                         SigmasText(l * l.transpose()));
 }
 
-/// Adds the equations of a model that is not from a plugin: those of its config entry.
-void AddEquations(const std::string& name, const std::string& origin,
+/// Adds the equations of a model if it is a formula.
+void AddEquations(const std::string& name, const std::string& model,
                   const std::vector<Space>& spaces, ExplainedTable& table) {
-  if (!origin.empty()) return;
+  if (model != kFormula) return;
   for (const Space& space : spaces) {
     if (!space.doc.empty()) table.notes.push_back(name + ": " + space.doc);
   }
@@ -122,7 +123,7 @@ ExplainedTable MotionTable(const Problem& problem, double step_s) {
                     noise == 0 ? "none" : std::to_string(noise) + kind});
     if (has_input) rows.back().push_back(InputText(motion));
     const MotionModel::Description& description = motion.model->description();
-    AddEquations(motion.name, description.origin, description.blocks, table);
+    AddEquations(motion.name, description.name, description.blocks, table);
     AddConfigNoise(motion.name, description.sqrt_noise, noise, table);
     const std::string sigmas = Join(ProcessNoise(problem, motion, step_s));
     if (sigmas.empty()) continue;
@@ -152,7 +153,7 @@ ExplainedTable SensorTable(const Problem& problem) {
     TextRow sensor_columns = {sensor.name, sensor.stream, sensor.model->name(),
                               MeasurementNoise(problem, sensor)};
     const SensorModel::Description& description = sensor.model->description();
-    AddEquations(sensor.name, description.origin, {description.measurement}, table);
+    AddEquations(sensor.name, description.name, {description.measurement}, table);
     AddConfigNoise(sensor.name, description.sqrt_noise, description.measurement.geometry.tangent,
                    table);
     for (std::size_t i = 0; i < sensor.roles.size(); ++i) {

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Compares formulas with the compiled models of the same equation.
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/direct_models.h"
+#include "alidade/testing/jacobians.h"
+#include "motion_models/constant.h"
+#include "motion_models/constant_velocity.h"
+#include "motion_models/quaternion_pose.h"
+#include "sensors/pose.h"
+#include "sensors/pseudorange.h"
+#include "sensors/range_bearing.h"
+#include "sensors/relative_pose.h"
+#include "sensors/scale_2d.h"
+#include "sensors/stereo_disparity.h"
+#include "support/formula_models.h"
+
+namespace alidade {
+namespace {
+
+using testing::Blocks;
+using testing::FormulaMotionOf;
+using testing::FormulaSensorOf;
+using testing::LargestDifference;
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+constexpr double kTolerance = 1e-12;
+
+/// Expects equal h, H and L of a sensor and of its formula, whose roles are those of the sensor.
+void ExpectTwinSensor(const SharedSensor& sensor, const std::string& yaml, const Blocks& roles,
+                      const double* known = nullptr) {
+  std::vector<Space> spaces = sensor->roles();
+  for (Space& space : spaces) space.flags = 0;
+  const SharedSensor twin = FormulaSensorOf(yaml, spaces);
+  EXPECT_EQ(twin->measurement().geometry, sensor->measurement().geometry);
+  EXPECT_LT(LargestDifference(testing::PredictionOf(twin, roles, known),
+                              testing::PredictionOf(sensor, roles, known)),
+            kTolerance);
+  EXPECT_LT(LargestDifference(testing::SensorJacobian(twin, roles, known),
+                              testing::SensorJacobian(sensor, roles, known)),
+            kTolerance);
+  const int m = sensor->measurement().geometry.tangent;
+  std::vector<double> l(static_cast<std::size_t>(m * m)), twin_l = l;
+  const auto pointers = testing::Pointers(roles);
+  EXPECT_EQ(sensor->SqrtNoise(pointers.data(), nullptr, l.data(), known), Status::kOk);
+  EXPECT_EQ(twin->SqrtNoise(pointers.data(), nullptr, twin_l.data(), known), Status::kOk);
+  EXPECT_LT(LargestDifference(twin_l, l), kTolerance);
+}
+
+/// Returns Q = G L L' G' as a list.
+std::vector<double> ProcessNoise(const SharedMotion& motion, const Blocks& x, const double* u,
+                                 double dt_s) {
+  const int n = motion->tangent_size(), n_w = motion->noise_size();
+  const auto step = testing::StepWithJacobians(motion, x, u, nullptr, dt_s);
+  RowMajor l(n_w, n_w);
+  EXPECT_EQ(motion->SqrtQ(testing::Pointers(x).data(), u, dt_s, l.data()), Status::kOk);
+  const RowMajor g = Eigen::Map<const RowMajor>(step.g.data(), n, n_w) * l;
+  const RowMajor q = g * g.transpose();
+  return {q.data(), q.data() + q.size()};
+}
+
+/// Expects equal f, F and Q of a motion model and of its formula.
+void ExpectTwinMotion(const SharedMotion& motion, const std::string& yaml, const Blocks& x,
+                      double dt_s, const double* u = nullptr) {
+  const SharedMotion twin = FormulaMotionOf(yaml);
+  const auto expected = testing::StepWithJacobians(motion, x, u, nullptr, dt_s);
+  const auto step = testing::StepWithJacobians(twin, x, u, nullptr, dt_s);
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    EXPECT_LT(LargestDifference(step.next[i], expected.next[i]), kTolerance) << i;
+  }
+  EXPECT_LT(LargestDifference(step.f, expected.f), kTolerance);
+  EXPECT_LT(LargestDifference(ProcessNoise(twin, x, u, dt_s), ProcessNoise(motion, x, u, dt_s)),
+            kTolerance);
+  EXPECT_EQ(twin->discrete_noise(), motion->discrete_noise());
+}
+
+TEST(FormulaTwins, StereoDisparity) {
+  ExpectTwinSensor(MakeSensor(StereoDisparity(400, 0.065, 1.5)),
+                   "constants: {bf: 400 * 0.065}\nz: {disparity: bf / depth}\n"
+                   "where: depth > 0\nsigma: {disparity: 1.5}\n",
+                   {{0.35}});
+}
+
+TEST(FormulaTwins, Scale2d) {
+  ExpectTwinSensor(MakeSensor(Scale2d::FromPixels(300, 1)),
+                   "let: {s: inverse_distance * depth}\nz: {inverse_scale: s}\n"
+                   "where: depth > 0 and inverse_distance > 0\n"
+                   "sigma: {inverse_scale: 2 / 300 * s^3}\n",
+                   {{0.35}, {3.1}});
+}
+
+TEST(FormulaTwins, Pose) {
+  ExpectTwinSensor(MakeSensor(Pose({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03})),
+                   "z: {position: position, orientation: orientation}\n"
+                   "sigma: {position: [0.1, 0.2, 0.3], orientation: [0.01, 0.02, 0.03]}\n",
+                   {{1, 2, 3}, {0.5, -0.5, 0.5, 0.5}});
+}
+
+TEST(FormulaTwins, RelativePose) {
+  ExpectTwinSensor(MakeSensor(RelativePose({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03})),
+                   "z:\n  position: unrotate(orientation, landmark_position - position)\n"
+                   "  orientation: multiply(conjugate(orientation), landmark_orientation)\n"
+                   "sigma: {position: [0.1, 0.2, 0.3], orientation: [0.01, 0.02, 0.03]}\n",
+                   {{1, 2, 3}, {0.5, -0.5, 0.5, 0.5}, {-2, 5, 1}, {0.8, 0.6, 0, 0}});
+}
+
+TEST(FormulaTwins, RangeBearing) {
+  ExpectTwinSensor(MakeSensor(RangeBearing<Xyz>(0.1, 0.02)),
+                   "let:\n  h: unrotate(orientation, landmark - position)\n"
+                   "z: {range: norm(h), bearing: unit(h)}\nsigma: {range: 0.1, bearing: 0.02}\n",
+                   {{1, 2, 3}, {0.5, -0.5, 0.5, 0.5}, {-2, 5, 1}});
+}
+
+TEST(FormulaTwins, Pseudorange) {
+  const std::array<double, 3> transmitter = {1.3e7, -2.1e7, 0.4e7};
+  ExpectTwinSensor(MakeSensor(Pseudorange(2.5)),
+                   "known: {transmitter: [x, y, z]}\n"
+                   "z: {pseudorange: norm(position - transmitter) + clock_bias}\n"
+                   "sigma: {pseudorange: 2.5}\n",
+                   {{100, -200, 300}, {45}}, transmitter.data());
+}
+
+TEST(FormulaTwins, Constant) {
+  ExpectTwinMotion(MakeMotion(Constant<2>(2, 0.3)),
+                   "blocks: {value: [a, b]}\nnoise: {wa: 0.3, wb: 0.3}\n"
+                   "rate: {value: '[wa, wb]'}\n",
+                   {{1, 2}}, 0.4);
+}
+
+TEST(FormulaTwins, ConstantVelocityWithContinuousNoise) {
+  ExpectTwinMotion(MakeMotion(ConstantVelocity<2, true>(0.7)),
+                   "blocks: {position: [x, y], velocity: [x, y]}\nnoise: {ax: 0.7, ay: 0.7}\n"
+                   "rate: {position: velocity, velocity: '[ax, ay]'}\n",
+                   {{1, 2}, {3, -4}}, 0.4);
+}
+
+TEST(FormulaTwins, ConstantVelocityWithDiscreteNoise) {
+  ExpectTwinMotion(MakeMotion(ConstantVelocity<1, false>(0.7)),
+                   "blocks: {position: number, velocity: number}\n"
+                   "noise: {kind: discrete, a: 0.7}\nrate: {position: velocity, velocity: a}\n",
+                   {{1}, {3}}, 0.4);
+}
+
+TEST(FormulaTwins, QuaternionPose) {
+  ExpectTwinMotion(MakeMotion(QuaternionPose({0.1, 0.2, 0.3}, {0.4, 0.5, 0.6})), R"yaml(
+blocks: {r: [x, y, z], q: unit_quaternion, v: [x, y, z], omega: [x, y, z]}
+noise: {kind: discrete, ax: 0.1, ay: 0.2, az: 0.3, bx: 0.4, by: 0.5, bz: 0.6}
+let: {v1: "v + dt * [ax, ay, az]", omega1: "omega + dt * [bx, by, bz]"}
+step:
+  r: r + dt * v1
+  q: multiply(q, rotation(dt * omega1))
+  v: v1
+  omega: omega1
+)yaml",
+                   {{1, 2, 3}, {0.5, -0.5, 0.5, 0.5}, {4, 5, 6}, {0.3, -0.2, 0.7}}, 0.4);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -314,10 +314,31 @@ const Fault kEstimatorFaults[] = {
         31,
         "estimators.ekf.use.accepted_by: 'alone' does not use sensor 'scale' on stream "
         "'inverse_scale'; expected an estimator with the same sensors"),
+    MakeFault("invariant_error_of_no_block", "depth",
+              {{kEkf, "{type: ekf, invariant_error: {side: left, blocks: [target.dept]}}"}}, 30,
+              "estimators.ekf.invariant_error.blocks[0]: block 'target.dept' does not exist; "
+              "expected one of target.depth, target.depth_rate, template.inverse_distance; did you "
+              "mean 'target.depth'?"),
+    MakeFault("invariant_error_of_no_group", "depth",
+              {{kEkf, "{type: ekf, invariant_error: {side: left, blocks: [target.depth]}}"}}, 30,
+              "estimators.ekf.invariant_error.blocks: blocks with the geometries vector(1) do not "
+              "form a group; the blocks must be, in this order, a position in the plane and a "
+              "heading; or a position and an orientation; or a position, an orientation and a "
+              "velocity"),
+    MakeFault("invariant_error_of_no_side", "depth",
+              {{kEkf, "{type: ekf, invariant_error: {side: both, blocks: [target.depth]}}"}}, 30,
+              "estimators.ekf.invariant_error.side: 'both'"),
+    MakeFault("invariant_error_with_landmarks", "pose",
+              {{kEkf,
+                "{type: ekf, invariant_error: {side: right, blocks: [cam.position, "
+                "cam.orientation]}}"}},
+              26,
+              "estimators.ekf.invariant_error.blocks: the state has landmarks, which the group "
+              "would have to contain; expected"),
     MakeFault("key_of_another_estimator", "depth", {{kEkf, "{type: rts, alpha: 0.1}"}}, 30,
               "estimators.ekf.alpha: unknown key; expected one of expect, fuse, gate, "
-              "max_covariance_repairs, max_dt_s, on_divergence, on_plugin_failure, overrides, "
-              "rejection_recovery, sensors, type, use"),
+              "invariant_error, max_covariance_repairs, max_dt_s, on_divergence, "
+              "on_plugin_failure, overrides, rejection_recovery, sensors, type, use"),
     MakeFault("unsupported_consider_block", "depth",
               {After(kTemplateBlocks, "    consider: [inverse_distance]"), {kEkf, "{type: rts}"}},
               13,

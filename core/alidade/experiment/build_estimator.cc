@@ -7,6 +7,7 @@
 
 #include "alidade/base/text.h"
 #include "alidade/config/tree.h"
+#include "alidade/estimation/invariant_error.h"
 #include "alidade/experiment/calibration.h"
 #include "alidade/experiment/defect_node.h"
 #include "alidade/experiment/estimator_registry.h"
@@ -239,12 +240,34 @@ int ReadUse(const Node& use, const EstimatorSpec& spec, const Node& estimators,
   return first;
 }
 
+/// Reads the key `invariant_error`: {side: left | right, blocks: [...]}.
+InvariantError ReadInvariantError(const Node& key, const Problem& problem) {
+  InvariantError error;
+  error.side = static_cast<ErrorSide>(key.At("side").Choice({"left", "right"}));
+  const Node blocks = key.At("blocks");
+  std::vector<std::string> known_names;
+  for (const Block& block : problem.layout.blocks()) known_names.push_back(block.name);
+  for (const Node& item : blocks.Items()) {
+    const std::string name = item.Text();
+    error.blocks.push_back(problem.layout.Find(name));
+    if (error.blocks.back() >= 0) continue;
+    item.Fail("block '" + name + "' does not exist", "one of " + Join(known_names),
+              Nearest(name, known_names));
+  }
+  if (const std::string defect = FindDefect(error, problem); !defect.empty()) {
+    blocks.Fail(defect,
+                "blocks of one motion model that are estimated, as in [robot.position, "
+                "robot.orientation, robot.velocity]; or no `invariant_error`");
+  }
+  return error;
+}
+
 /// Creates the estimator of the entry `node`. `plugin` is null for a built-in type. Error: kPlugin.
-std::unique_ptr<Estimator> Create(const EstimatorMaker& make, const EstimatorSpec& spec,
+std::unique_ptr<Estimator> Create(const EstimatorMaker& make, const Problem& problem,
                                   const std::vector<StreamInfo>* streams, const PluginEntry* plugin,
                                   const Node& node) {
   const auto create = [&] {
-    return make(spec.problem, streams != nullptr ? *streams : spec.problem.streams);
+    return make(problem, streams != nullptr ? *streams : problem.streams);
   };
   if (plugin == nullptr) return create();
   std::string reason = "an exception of unknown type";
@@ -314,6 +337,10 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
   const std::vector<std::string> sensor_names = ReadSensorList(entry, merged.root());
   const auto use = entry.Find("use");
   if (use && use->is_map()) use->Declare("accepted_by");
+  const auto invariant_error = entry.Find("invariant_error");
+  for (const char* key : {"side", "blocks"}) {
+    if (invariant_error && invariant_error->is_map()) invariant_error->Declare(key);
+  }
   RefuseUnsupportedKeys(spec.type, entry);
   entry.RejectUnread();
   spec.problem = ReadProblem(merged.root(), host, sensor_names);
@@ -330,7 +357,13 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
     landmarks.min_observations = 1;
     if (landmarks.prior) landmarks.prior->min_observations = 0;
   }
-  spec.estimator = Create(make, spec, streams, of_plugin, entry);
+  const auto create = [&](const Problem& problem) {
+    return Create(make, problem, streams, of_plugin, entry);
+  };
+  spec.estimator =
+      invariant_error
+          ? MakeInvariant(ReadInvariantError(*invariant_error, spec.problem), spec.problem, create)
+          : create(spec.problem);
   if (use)
     spec.accepted_by = ReadUse(*use, spec, config.root().At("estimators"), earlier_estimators);
   return spec;

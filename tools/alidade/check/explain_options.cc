@@ -151,6 +151,11 @@ std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec) {
   if (const auto use = entry.Find("use"); use && use->is_map()) {
     rows.push_back({"use", "the measurements that " + use->At("accepted_by").Text() + " accepts"});
   }
+  if (const auto error = entry.Find("invariant_error")) {
+    std::vector<std::string> blocks;
+    for (const Node& block : error->At("blocks").Items()) blocks.push_back(block.Text());
+    rows.push_back({"invariant_error", error->At("side").Text() + ", of " + Join(blocks)});
+  }
   rows.push_back({"on_divergence", spec.on_divergence == OnDivergence::kFail
                                        ? "fail: the run ends with exit code 79"
                                        : "report: the run continues"});

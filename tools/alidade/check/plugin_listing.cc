@@ -52,6 +52,9 @@ std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
       "names of the sensors that the estimator uses, in the order of their updates");
   add("use", "choice or map", "all",
       "all: every measurement; {accepted_by: NAME}: the measurements that the filter NAME accepts");
+  add("invariant_error", "map", "none",
+      "{side: left, blocks: [...]} or {side: right, blocks: [...]}: the error of position, "
+      "orientation and velocity is that of one element of a Euclidean group");
   add("on_divergence", "choice", "report", "report: continue the run; fail: end the run",
       {"report", "fail"});
   add("on_plugin_failure", "choice", "skip",

@@ -18,10 +18,10 @@ namespace alidade {
 ///
 ///   symbol     shape  unit    frame  meaning
 ///   p          2, 3   m       world  position of the body
-///   R          -      rad, -  -      attitude of the body, world_from_body: a heading in the plane,
+///   R          -      rad, -  -      attitude, world_from_body: a heading in the plane,
 ///                                    an orientation in space
 ///   a          2, 3   m       world  the point, known
-///   l, B       -      m, -    body   lever arm and mounting (body_from_sensor) of the sensor: model
+///   l, B       -      m, -    body   lever arm and mounting (body_from_sensor): model
 ///                                    parameter states, default: constant at the neutral element
 ///   sigma      1      rad     -      standard deviation of each angle; > 0
 ///

@@ -34,15 +34,15 @@ using RadarPlot = typename Joined<
 ///   model      d = |h|,   az = atan2(h_y, h_x),   el = atan2(h_z, sqrt(h_x^2 + h_y^2)),
 ///              rr = h' u / |h|,   h = p - s,   u = v - w
 ///   Jacobian   automatic differentiation               up to 4 x 12
-///   noise      R = diag(sigma_d^2, sigma_az^2, sigma_el^2, sigma_rr^2), without the quantities that
-///              are not measured; or the covariance of the measurement
+///   noise      R = diag(sigma_d^2, sigma_az^2, sigma_el^2, sigma_rr^2), of the measured
+///              quantities, or the covariance of the measurement
 ///
 ///   symbol     shape  unit    frame  meaning
 ///   d, rr      1      m, m/s  -      range and range rate
 ///   az, el     1      rad     world  azimuth, counter-clockwise from x, and elevation (D = 3)
 ///   p, v       D      m, m/s  world  position and velocity of the target
 ///   s, w       D      m, m/s  world  position and velocity of the radar; default: constant at 0
-///   sigma_*    1      m, rad, m/s  -  standard deviations; > 0. A quantity without its sigma is not
+///   sigma_*    1      m, rad, m/s  -  standard deviations; > 0. Only a quantity with its sigma is
 ///                                    measured
 ///
 /// Defined for  h != 0; azimuth and elevation in space for h_x or h_y != 0. Otherwise

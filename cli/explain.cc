@@ -21,9 +21,10 @@ struct ExplainArguments {
 };
 
 ExitCode ExplainConfig(const ExplainArguments& arguments) {
-  const Config config = arguments.input.Load();
-  const PluginHost host = arguments.input.Host(config);
-  const Experiment experiment = BuildExperiment(config, host);
+  const Config written = arguments.input.Load();
+  const PluginHost host = arguments.input.Host(written);
+  const Experiment experiment = BuildExperiment(written, host);
+  const Config& config = *experiment.config;
   if (arguments.page.empty()) {
     PrintText(Explain(config, experiment));
     return ExitCode::kOk;

@@ -106,12 +106,13 @@ bool IsAcceptable(const RunResult& result) {
 }
 
 ExitCode RunConfig(const RunArguments& arguments) {
-  Config config = arguments.input.Load();
-  if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
-  const Output output = OutputFolder(arguments.folder, config, arguments.input, arguments.force);
-  const PluginHost host = arguments.input.HostFor(config);
+  Config written = arguments.input.Load();
+  if (arguments.seed) written.Set("source.seed", std::to_string(*arguments.seed), "--seed");
+  const Output output = OutputFolder(arguments.folder, written, arguments.input, arguments.force);
+  const PluginHost host = arguments.input.HostFor(written);
   StopOnSignals();  // BuildExperiment may wait for a pipe, which a signal must interrupt
-  Experiment experiment = BuildExperiment(config, host);
+  Experiment experiment = BuildExperiment(written, host);
+  const Config& config = *experiment.config;
   const std::unique_ptr<RunViewer> viewer = ViewerOf(arguments, experiment, config);
   const std::unique_ptr<LiveRun> live = LiveRunOf(arguments, config, output.folder);
   Recorder recorder(RecordOf(arguments, config, output.folder, host), config);

@@ -16,6 +16,7 @@
 #include "alidade/base/random.h"
 #include "alidade/config/config.h"
 #include "alidade/experiment/read_problem.h"
+#include "alidade/experiment/short_forms.h"
 #include "alidade/plugin/plugin_host.h"
 #include "sensor_schedule.h"
 
@@ -93,8 +94,8 @@ class Models : public Source {
   /// Builds the problem that defines the truth: that of the config, merged with `overrides`.
   void BuildTruth(const SourceArguments& arguments) {
     const auto overrides = arguments.entry.Find("overrides");
-    const Config truth =
-        overrides ? arguments.config->Merged(*overrides) : arguments.config->Copy();
+    Config truth = overrides ? arguments.config->Merged(*overrides) : arguments.config->Copy();
+    ExpandShortForms(truth, *arguments.host);
     problem_ = ReadProblem(truth.root(), *arguments.host, {});
     start_s_ = problem_.initial_time_s.value_or(0.0);
     if (!overrides) return;
@@ -128,12 +129,7 @@ class Models : public Source {
       const auto owner = initial_values ? initial_values->Find(block.owner) : std::nullopt;
       if (owner && !owner->is_map()) owner->Fail("this value is not a map", "{BLOCK: value}");
       if (const auto value = owner ? owner->Find(name) : std::nullopt) {
-        constexpr double kLengthTolerance = 1e-3;
-        x = value->Numbers(block.geometry().ambient);
-        if (DistanceFrom(block.geometry(), x.data()) > kLengthTolerance) {
-          value->Fail("the value does not have unit length",
-                      "a unit vector, or a unit quaternion [w, x, y, z], to 1e-3");
-        }
+        x = ReadBlockValue(*value, block.space);
         block.geometry().Normalise(x.data());
         continue;
       }

@@ -89,6 +89,21 @@ TEST_F(ExplainCli, RoundsNumbers) {
   EXPECT_TRUE(Contains(outcome.out, " 0.2513 +- 0.1\n")) << outcome.out;
 }
 
+// Values that the config contains are not listed.
+TEST_F(ExplainCli, ListsWhatShortFormsFillIn) {
+  EXPECT_FALSE(Contains(Call({"explain", "config.yaml"}).out, "filled in"));
+  const Outcome outcome = Call({"explain", "config.yaml", "--set", "sensors.stereo.roles=target",
+                                "--set", "state.target.initial.depth_rate={sigma: 0.5}", "--set",
+                                "estimators=[ukf]", "--set", "defaults={gate: 0.99}"});
+  EXPECT_TRUE(Contains(outcome.out,
+                       "\nfilled in (short forms and defaults)\n"
+                       "    state.target.initial.depth_rate.mean  0\n"
+                       "    sensors.stereo.roles.depth            target.depth\n"
+                       "    estimators.ukf.type                   ukf\n"
+                       "    estimators.ukf.gate                   0.99\n"))
+      << outcome.out << outcome.err;
+}
+
 std::size_t Count(const std::string& text, const std::string& part) {
   std::size_t count = 0;
   for (std::size_t i = text.find(part); i != text.npos; i = text.find(part, i + 1)) ++count;

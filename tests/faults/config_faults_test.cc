@@ -137,16 +137,19 @@ const Fault kKeyFaults[] = {
     MakeFault("03_initial_covariance_is_a_number", "depth",
               {{"mean: 3.3, sigma: 0.5", "mean: 3.3, covariance: 0.25"}}, 13,
               "not a list of rows; expected a list of one row of one number, as in [[0.01]]"),
-    MakeFault("03_estimators_are_a_list", "depth", {{"  ekf: {type: ekf}", "  - {type: ekf}"}}, 30,
-              "estimators: a list; expected a map, as in ekf: {type: ekf}"),
+    MakeFault(
+        "03_estimators_are_a_list", "depth", {{"  ekf: {type: ekf}", "  - {type: ekf}"}}, 30,
+        "estimators[0]: the item of the list is not a name; expected a name, or a map instead "
+        "of the list"),
     MakeFault("03_estimator_is_a_name", "depth", {{kEkf, "ekf"}}, 30,
               "estimators.ekf: 'ekf'; expected a map, as in {type: ekf}"),
     MakeFault("03_missing_key_with_a_longer_one", "depth", {{"focal_px", "focal_length_px"}}, 15,
               "sensors.stereo.focal_px: missing; model 'stereo_disparity' needs it (px, > 0: "
               "rectified focal length); found 'focal_length_px' at line 19; did you mean "
               "'focal_px'?"),
-    MakeFault("03_quaternion_is_a_list", "pose", {{"{w: 1, x: 0, y: 0, z: 0}", "[1, 0, 0, 0]"}}, 9,
-              "orientation.mean: a list; expected a map, as in {w: 1, x: 0, y: 0, z: 0}"),
+    MakeFault("03_quaternion_is_a_word", "pose", {{"{w: 1, x: 0, y: 0, z: 0}", "identity"}}, 9,
+              "orientation.mean: 'identity'; expected a map, as in {w: 1, x: 0, y: 0, z: 0}, with "
+              "rpy_deg: [ROLL, PITCH, YAW] in place of a quaternion, or a list"),
     MakeFault("03_version_missing", "depth", {{"alidade: 1\n", ""}}, 1,
               "alidade: missing key, needed by every config, because it is the version of the "
               "schema; expected the first line `alidade: 1`"),
@@ -398,7 +401,7 @@ const Fault kLandmarkFaults[] = {
     MakeFault("landmarks_max_per_frame_unknown", "landmarks",
               {After(kPrior, "  max_per_frame: all")}, 11,
               "landmarks.max_per_frame: 'all' is not a finite number; expected an integer in [1, "
-              "1000000], or unlimited"),
+              "1000000], or none"),
     MakeFault("landmarks_missing", "landmarks", {{"landmarks:\n  " + kPrior + '\n', ""}}, 0,
               "landmarks: missing key"),
     MakeFault("landmarks_name_of_a_state_entry", "landmarks",

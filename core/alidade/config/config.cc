@@ -81,6 +81,10 @@ std::string ReadConfig(const fs::path& file, const Place& place, std::string_vie
   return internal::ReadFile(file, fail, kLimit);
 }
 
+void ExpandEstimatorNames(const ConfigTree& root) {
+  if (ConfigTree* const estimators = Child(root, "estimators")) internal::ExpandNames(*estimators);
+}
+
 std::unique_ptr<ConfigTree> ParseRoot(std::string_view text, const std::string& name,
                                       Budget* budget) {
   auto root = internal::ParseYaml(text, Origin{name}, budget);
@@ -92,6 +96,7 @@ std::unique_ptr<ConfigTree> ParseRoot(std::string_view text, const std::string& 
     FailAt(root->place, {}, scalar ? Quoted(root->text) : "a list",
            "a map of keys, as in 'key: value'");
   }
+  ExpandEstimatorNames(*root);
   return root;
 }
 
@@ -354,6 +359,7 @@ void Config::Set(std::string_view dotted_key, std::string_view value, std::strin
   next->key = node->key;
   next->index = node->index;
   *slot = std::move(next);
+  ExpandEstimatorNames(*tree_);
   AnchorPaths(*tree_, {});
 }
 

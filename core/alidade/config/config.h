@@ -31,6 +31,8 @@ class Node {
   const ConfigTree& tree() const { return *tree_; }
 
   Kind kind() const;
+  /// Returns true if the program filled in this value, for example a default or a short form.
+  bool is_filled() const;
   bool is_map() const { return kind() == Kind::kMap; }
   const Place& place() const;
   /// Returns the key path from the root, such as `sensors.stereo.focal_px` or `source.columns[2]`.
@@ -100,7 +102,8 @@ class Node {
 /// share one tree.
 class Config {
  public:
-  /// Reads a file and the files that its key `include` lists. Values of the file replace values of
+  /// Reads a file and the files that its key `include` lists. A list of names under `estimators`
+  /// counts as a map of empty maps. Values of the file replace values of
   /// the included files. An included file must lie inside the folder of the file that includes it,
   /// unless `allow_outside` is true. Relative paths (`source.path`, the items of `plugins`) are
   /// resolved against the folder of the file that contains them. Errors: kInputMissing, kBadConfig,
@@ -111,6 +114,8 @@ class Config {
   static Config FromText(std::string_view text, std::string_view name);
 
   Node root() const;
+  /// Returns the tree, which all copies of the config share, except those made by Copy().
+  ConfigTree& tree() { return *tree_; }
   /// Returns the folder of the file, or `.` if the config was read from a text.
   const std::filesystem::path& folder() const { return folder_; }
   const std::string& name() const { return name_; }

@@ -44,6 +44,7 @@ std::string ItemCountText(std::size_t count) {
 }  // namespace
 
 Node::Kind Node::kind() const { return tree_->kind; }
+bool Node::is_filled() const { return tree_->is_filled; }
 const Place& Node::place() const { return tree_->place; }
 const std::string& Node::path() const { return PathOf(*tree_); }
 

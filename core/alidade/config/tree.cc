@@ -3,11 +3,41 @@
 
 #include <algorithm>
 
+#include "alidade/base/number_text.h"
+
 namespace alidade::internal {
 namespace {
 
 std::string Component(const ConfigTree& tree) {
   return tree.index < 0 ? tree.key : '[' + std::to_string(tree.index) + ']';
+}
+
+/// Appends an empty node that is marked as filled in. A list has items without keys.
+ConfigTree& Append(ConfigTree& parent, const std::string& key) {
+  const bool is_item = parent.kind == Node::Kind::kList;
+  parent.children.push_back(std::make_unique<ConfigTree>());
+  ConfigTree& child = *parent.children.back();
+  child.is_filled = true;
+  child.place = parent.place;
+  child.parent = &parent;
+  child.key = key;
+  if (is_item) child.index = static_cast<int>(parent.children.size()) - 1;
+  child.path = is_item ? PathOf(parent) + Component(child) : PathBelow(PathOf(parent), key);
+  return child;
+}
+
+void SetText(ConfigTree& node, const std::string& text) {
+  node.kind = Node::Kind::kScalar;
+  node.text = text;
+}
+
+/// Marks `copy` and all nodes below it as filled in, with the key paths of `original`.
+void MarkFilled(const ConfigTree& original, ConfigTree& copy) {
+  copy.is_filled = true;
+  copy.path = PathOf(original);
+  for (std::size_t i = 0; i < copy.children.size(); ++i) {
+    MarkFilled(*original.children[i], *copy.children[i]);
+  }
 }
 
 }  // namespace
@@ -38,6 +68,63 @@ ConfigTree* Child(const ConfigTree& map, std::string_view key) {
   return nullptr;
 }
 
+void FillText(ConfigTree& map, const std::string& key, const std::string& text) {
+  SetText(Append(map, key), text);
+}
+
+void FillNumbers(ConfigTree& map, const std::string& key, const std::vector<double>& values) {
+  ConfigTree& node = Append(map, key);
+  if (values.size() == 1) return SetText(node, NumberText(values[0]));
+  node.kind = Node::Kind::kList;
+  for (const double value : values) SetText(Append(node, ""), NumberText(value));
+}
+
+void FillCopy(ConfigTree& map, const ConfigTree& value) {
+  if (ConfigTree* const existing = Child(map, value.key)) {
+    if (existing->kind != Node::Kind::kMap || value.kind != Node::Kind::kMap) return;
+    for (const auto& child : value.children) FillCopy(*existing, *child);
+    return;
+  }
+  auto copy = Clone(value);
+  copy->parent = &map;
+  MarkFilled(value, *copy);
+  map.children.push_back(std::move(copy));
+}
+
+void FillMap(ConfigTree& node) {
+  node.kind = Node::Kind::kMap;
+  node.is_filled = true;
+  node.text.clear();
+  node.children.clear();
+}
+
+void Remove(ConfigTree& map, std::string_view key) {
+  std::erase_if(map.children, [&](const auto& child) { return child->key == key; });
+}
+
+void ExpandNames(ConfigTree& list) {
+  if (list.kind != Node::Kind::kList) return;
+  for (const auto& child : list.children) {
+    if (child->kind != Node::Kind::kScalar) {
+      FailAt(child->place, PathOf(*child), "the item of the list is not a name",
+             "a name, or a map instead of the list");
+    }
+    if (Child(list, child->text) != nullptr) {
+      FailAt(child->place, PathOf(*child), Quoted(child->text) + " is listed twice",
+             "each name only once");
+    }
+    child->key = std::move(child->text);
+    child->index = -1;
+    child->key_line = child->place.line;
+    child->key_column = child->place.column;
+    child->kind = Node::Kind::kMap;
+    child->text.clear();
+    child->path.clear();
+    child->quoted = false;
+  }
+  list.kind = Node::Kind::kMap;
+}
+
 std::string Quoted(std::string_view text) {
   constexpr std::size_t kShown = 60;
   constexpr std::string_view kHex = "0123456789abcdef";
@@ -66,6 +153,7 @@ std::unique_ptr<ConfigTree> Clone(const ConfigTree& tree) {
   auto copy = std::make_unique<ConfigTree>();
   copy->kind = tree.kind;
   copy->quoted = tree.quoted;
+  copy->is_filled = tree.is_filled;
   copy->place = tree.place;
   copy->text = tree.text;
   copy->key = tree.key;

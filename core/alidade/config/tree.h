@@ -14,7 +14,8 @@ namespace alidade {
 /// Node of a parsed config, with its children.
 struct ConfigTree {
   Node::Kind kind = Node::Kind::kNull;
-  bool quoted = false;  ///< whether a scalar is written as 'text', "text" or a block
+  bool quoted = false;     ///< whether a scalar is written as 'text', "text" or a block
+  bool is_filled = false;  ///< true: the program added this value, see Node::is_filled()
   Place place;
   std::string text;  ///< text of a scalar as it is written
   std::vector<std::unique_ptr<ConfigTree>> children;
@@ -65,6 +66,21 @@ std::string PathBelow(const std::string& path, std::string_view key);
 Place KeyPlace(const ConfigTree& tree);
 /// Returns the value of `key`, or null if `map` does not contain `key`.
 ConfigTree* Child(const ConfigTree& map, std::string_view key);
+/// Adds a value to `map`, which does not contain `key`. The value is marked as filled in and has
+/// the place of `map`. FillNumbers adds a number if `values` has one item, else a list.
+void FillText(ConfigTree& map, const std::string& key, const std::string& text);
+void FillNumbers(ConfigTree& map, const std::string& key, const std::vector<double>& values);
+/// Adds `value` to `map`, or to the existing value of its key if both are maps. Has no effect on
+/// any other existing value. The added values are marked as filled in; they keep place and path.
+void FillCopy(ConfigTree& map, const ConfigTree& value);
+/// Replaces the value of `node` by an empty map, which is marked as filled in.
+void FillMap(ConfigTree& node);
+/// Removes `key` from `map`. Has no effect if the map does not contain `key`.
+void Remove(ConfigTree& map, std::string_view key);
+/// Replaces a list of names, as in `estimators: [ekf, ukf]`, by a map with an empty map for each
+/// name. Has no effect on any other value.
+void ExpandNames(ConfigTree& list);
+
 /// Returns a deep copy in which no key counts as read.
 std::unique_ptr<ConfigTree> Clone(const ConfigTree& tree);
 std::string ToYaml(const ConfigTree& root);

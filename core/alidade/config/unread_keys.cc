@@ -27,7 +27,8 @@ std::string UnknownKey(const ConfigTree& map, const ConfigTree& child) {
     if (!unit.empty() && Child(map, known) == nullptr) {
       return ErrorLine(KeyPlace(child), PathOf(child), "wrong unit '" + unit + "'", known);
     }
-    if (Child(map, known) == nullptr) absent.push_back(known);
+    const ConfigTree* const value = Child(map, known);
+    if (value == nullptr || value->is_filled) absent.push_back(known);
   }
   std::string nearest = Nearest(child.key, absent);
   if (nearest.empty()) nearest = Nearest(child.key, map.known_keys);

@@ -12,6 +12,7 @@
 #include "alidade/experiment/defect_node.h"
 #include "alidade/experiment/estimator_registry.h"
 #include "alidade/experiment/read_problem.h"
+#include "alidade/experiment/short_forms.h"
 #include "alidade/plugin/plugin_host.h"
 
 namespace alidade::internal {
@@ -329,8 +330,9 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
     }
   }
   const auto overrides = entry.Find("overrides");
-  const Config merged = overrides ? config.Merged(*overrides) : config;
+  Config merged = overrides ? config.Merged(*overrides) : config;
   if (overrides) {
+    ExpandShortForms(merged, host);
     CheckOverrides(*overrides, config.root(), merged.root());
     spec.overrides = overrides->ToYaml();
   }

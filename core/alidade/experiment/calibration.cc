@@ -6,6 +6,8 @@
 
 #include "alidade/experiment/calibration_file.h"
 
+#include "alidade/config/tree.h"
+
 namespace alidade::internal {
 namespace {
 
@@ -85,6 +87,12 @@ Config WithCalibration(const Config& config, const Source& source) {
   Config calibrated = config.Merged(calibration->root());
   MarkAsRead(calibrated.root().At("calibration"));
   return calibrated;
+}
+
+Config WithoutCalibration(const Config& config) {
+  Config copy = config.Copy();
+  Remove(copy.tree(), "calibration");
+  return copy;
 }
 
 }  // namespace alidade::internal

@@ -17,5 +17,7 @@ Config WithCameraFiles(const Config& config);
 /// unchanged if the data have no calibration, or if `source.calibration` is `ignore`. Errors:
 /// kBadConfig, and those of Source::Calibration.
 Config WithCalibration(const Config& config, const Source& source);
+/// Returns a copy of the config without the calibration of the data.
+Config WithoutCalibration(const Config& config);
 
 }  // namespace alidade::internal

@@ -10,6 +10,7 @@
 #include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/read_report.h"
 #include "alidade/experiment/run.h"
+#include "alidade/experiment/short_forms.h"
 #include "alidade/experiment/source_plugin.h"
 #include "alidade/experiment/truth_match.h"
 #include "alidade/io/text_table.h"
@@ -247,7 +248,8 @@ std::set<std::string> KeysAndScalarsOf(const Config& config) {
   return words;
 }
 
-Experiment BuildExperiment(const Config& config, const PluginHost& host) {
+Experiment BuildExperiment(const Config& written, const PluginHost& host) {
+  const Config config = written.Copy();
   CheckSchema(config.root());
   for (const char* key : {"title", "output"}) {
     if (const auto text = config.root().Find(key)) static_cast<void>(text->Text());
@@ -261,7 +263,9 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   experiment.out_of_sequence = ReadOutOfSequence(config.root());
   experiment.source = CreateSource(host, config, experiment.seed,
                                    experiment.out_of_sequence.policy != OutOfSequence::kReject);
-  const Config calibrated = internal::WithCalibration(config, *experiment.source);
+  Config calibrated = internal::WithCalibration(config, *experiment.source);
+  ExpandShortForms(calibrated, host);
+  experiment.config = internal::WithoutCalibration(calibrated);
   source.RejectUnread();
   const Node root = calibrated.root();
   DeclareCommon(root);
@@ -273,14 +277,14 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   experiment.out_of_sequence.ranks = RanksOf(streams, full_problem);
   experiment.segments = ReadSegments(root, full_problem, streams);
   experiment.report_rows = internal::ReadReportRows(root, full_problem, experiment.segments);
-  constexpr const char* kEstimators = "ekf: {type: ekf}";
-  const Node estimators = root.At("estimators", "a run", "estimators: {ekf: {type: ekf}}");
-  estimators.ExpectMap(kEstimators);
+  constexpr const char* kEstimators = "[ekf, ukf]";
+  const Node estimators = root.At("estimators", "a run", "estimators: [ekf]");
+  estimators.ExpectMap("{ekf: {gate: 0.999}}, or a list of types, as in [ekf, ukf]");
   for (const auto& [name, entry] : estimators.Entries()) {
     internal::AddEstimator(calibrated, host, name, experiment);
   }
   if (experiment.estimators.empty()) {
-    estimators.Fail("the map is empty",
+    estimators.Fail("there are no estimators",
                     "at least one estimator, as in " + std::string(kEstimators));
   }
   experiment.reference = ReadReference(root, experiment.estimators);

@@ -78,6 +78,7 @@ struct OutOfSequencePolicy {
 
 /// Experiment that was built from a config and checked, and is ready to run.
 struct Experiment {
+  std::optional<Config> config;  ///< the config with expanded short forms (ExpandShortForms)
   std::unique_ptr<Source> source;
   std::vector<EstimatorSpec> estimators;
   std::vector<Segment> segments;
@@ -98,6 +99,6 @@ std::set<std::string> KeysAndScalarsOf(const Config& config);
 
 /// Creates the experiment that a config describes. Errors: kBadConfig, kPlugin, kInputMissing, and
 /// others.
-Experiment BuildExperiment(const Config& config, const PluginHost& host);
+Experiment BuildExperiment(const Config& written, const PluginHost& host);
 
 }  // namespace alidade

@@ -54,11 +54,15 @@ void AddDeviations(const Node& map, const std::string& path, bool is_noise,
   }
 }
 
-/// Adds the values of the blocks in the list `constant` of an entry.
-void AddConstants(const Node& entry, const std::string& path, Parameters& parameters) {
+/// Adds the values of the blocks in the list `constant` of the entry `owner`. Omits unit vectors
+/// and quaternions, whose elements are not independent.
+void AddConstants(const Node& entry, const std::string& owner, const std::string& path,
+                  const StateLayout& layout, Parameters& parameters) {
   const auto constant = entry.Find("constant"), initial = entry.Find("initial");
   if (!constant || !initial) return;
   for (const Node& block : constant->Items()) {
+    const BlockId id = layout.Find(owner + '.' + block.Text());
+    if (id >= 0 && layout[id].geometry().tangent != layout[id].geometry().ambient) continue;
     const auto value = initial->Find(block.Text());
     const auto mean = value ? value->Find("mean") : std::nullopt;
     if (mean) AddNumbers(*mean, path + ".initial." + block.Text() + ".mean", false, parameters);
@@ -86,19 +90,19 @@ std::string FilterParameter::YamlOf(double value) const {
 
 std::vector<FilterParameter> FilterParametersOf(const Node& root, const Problem& problem) {
   Parameters parameters;
-  const auto add_entry = [&](const Node& entry, const std::string& path) {
+  const auto add_entry = [&](const Node& entry, const std::string& name, const std::string& path) {
     AddDeviations(entry, path, false, parameters);
-    AddConstants(entry, path, parameters);
+    AddConstants(entry, name, path, problem.layout, parameters);
   };
   const std::vector<std::string> states = NamesOf(problem.motions);
   for (const auto& [name, entry] : root.At("state").Entries()) {
     // The other motion models are those of the states that sensors own.
-    if (std::ranges::find(states, name) != states.end()) add_entry(entry, "state." + name);
+    if (std::ranges::find(states, name) != states.end()) add_entry(entry, name, "state." + name);
   }
   for (const SensorBinding& sensor : problem.sensors) {
     const Node entry = root.At("sensors").At(sensor.name);
     const std::string path = "sensors." + sensor.name;
-    add_entry(entry, path);
+    add_entry(entry, sensor.name, path);
     AddTimeOffset(entry, path, parameters);
   }
   return parameters;

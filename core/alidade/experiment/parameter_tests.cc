@@ -15,6 +15,7 @@
 #include "alidade/experiment/filter_parameters.h"
 #include "alidade/experiment/run.h"
 #include "alidade/experiment/score_test.h"
+#include "alidade/experiment/short_forms.h"
 
 namespace alidade {
 namespace {
@@ -79,6 +80,7 @@ class FilterRuns {
         name_(name),
         experiment_(BuildExperiment(config_, host)),
         data_(name) {
+    config_ = *experiment_.config;
     const auto& estimators = experiment_.estimators;
     if (std::ranges::find(estimators, name, &EstimatorSpec::name) != estimators.end()) return;
     config_.root()
@@ -93,7 +95,8 @@ class FilterRuns {
   std::vector<FilterParameter> Parameters() const {
     const Config calibrated = internal::WithCalibration(config_.Copy(), *experiment_.source);
     const auto overrides = calibrated.root().At("estimators").At(name_).Find("overrides");
-    const Config merged = overrides ? calibrated.Merged(*overrides) : calibrated;
+    Config merged = overrides ? calibrated.Merged(*overrides) : calibrated;
+    ExpandShortForms(merged, host_);
     return internal::FilterParametersOf(merged.root(), spec().problem);
   }
   /// Returns the probability of the gate of the filter; 1 without a gate.

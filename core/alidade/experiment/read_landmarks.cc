@@ -14,12 +14,25 @@ namespace {
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 constexpr int kMaxCount = 1'000'000;
 
+/// Reads a number of frames or landmarks. Has no effect if the key is missing or `none`.
+void ReadCount(const Node& map, const char* key, int& count) {
+  const auto node = map.Find(key);
+  if (!node || (node->kind() == Node::Kind::kScalar && node->Text() == "none")) return;
+  try {
+    count = static_cast<int>(node->Integer(1, kMaxCount));
+  } catch (const Error& error) {
+    throw Error(error.code(), std::string(error.what()) + ", or none");
+  }
+}
+
 LandmarkOptions::Prior ReadPrior(const Node& node) {
   LandmarkOptions::Prior prior;
-  prior.inverse_distance = node.At("inverse_distance", "landmarks.prior").Number(0.0, kUnbounded);
+  node.Declare("distance_m");
+  constexpr const char* kShape = "distance_m: [NEAR, FAR], or inverse_distance and sigma";
+  prior.inverse_distance =
+      node.At("inverse_distance", "landmarks.prior", kShape).Number(0.0, kUnbounded);
   prior.sigma = node.At("sigma", "landmarks.prior").Number(0.0, kUnbounded, true);
-  if (const auto n = node.Find("adapt_after"))
-    prior.adapt_after = static_cast<int>(n->Integer(1, kMaxCount));
+  ReadCount(node, "adapt_after", prior.adapt_after);
   if (const auto n = node.Find("min_observations"))
     prior.min_observations = static_cast<int>(n->Integer(1, kMaxCount));
   node.RejectUnread();
@@ -27,26 +40,13 @@ LandmarkOptions::Prior ReadPrior(const Node& node) {
 }
 
 void ReadPrune(const Node& node, LandmarkOptions& options) {
-  if (const auto frames = node.Find("max_missed_frames")) {
-    options.max_missed_frames = static_cast<int>(frames->Integer(1, kMaxCount));
-  }
+  ReadCount(node, "max_missed_frames", options.max_missed_frames);
   const auto ratio = node.Find("min_match_ratio"), attempts = node.Find("min_attempts");
   if (ratio) options.min_match_ratio = ratio->Number(0.0, 1.0);
   if (attempts && !ratio)
     attempts->Fail("this key has no effect without min_match_ratio", "both keys, or neither");
   if (attempts) options.min_attempts = static_cast<int>(attempts->Integer(1, kMaxCount));
   node.RejectUnread();
-}
-
-int ReadMaxPerFrame(const Node& node) {
-  if (node.kind() == Node::Kind::kScalar && node.Text() == "unlimited") {
-    return LandmarkOptions::kUnlimited;
-  }
-  try {
-    return static_cast<int>(node.Integer(1, kMaxCount));
-  } catch (const Error& error) {
-    throw Error(error.code(), std::string(error.what()) + ", or unlimited");
-  }
 }
 
 std::vector<KnownLandmark> ReadKnown(const Node& list) {
@@ -88,8 +88,7 @@ LandmarkOptions ReadOptions(const Node& node) {
   LandmarkOptions options;
   node.Declare("representation");
   if (const auto prior = node.Find("prior")) options.prior = ReadPrior(*prior);
-  if (const auto maximum = node.Find("max_per_frame"))
-    options.max_per_frame = ReadMaxPerFrame(*maximum);
+  ReadCount(node, "max_per_frame", options.max_per_frame);
   if (const auto observations = node.Find("min_observations")) {
     options.min_observations = static_cast<int>(observations->Integer(1, kMaxCount));
   }
@@ -160,7 +159,7 @@ void CheckOptions(const Node& node, const LandmarkOptions& options, const Sensor
   const std::string model = "model '" + sensor.model->name() + "' of sensor '" + sensor.name + "'";
   if (sensor.model->inverse().prior_size > 0 && !options.prior) {
     node.Fail("a prior is missing: " + model + " does not determine the distance of a landmark",
-              "prior: {inverse_distance: ..., sigma: ...}");
+              "prior: {distance_m: [NEAR, FAR]}");
   }
   if (options.prior) {
     const Node prior = node.At("prior");

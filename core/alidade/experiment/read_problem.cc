@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/experiment/read_problem.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <utility>
@@ -50,29 +53,34 @@ std::string IdentityMap(const Geometry& geometry) {
   return '{' + map + '}';
 }
 
-/// Reads the value of a block: a number, a list, or a map such as {w: , x: , y: , z: } if the value
-/// contains a unit quaternion. A quaternion cannot be a list, because programs disagree about the
-/// order of its elements.
-std::vector<double> ReadMean(const Node& node, const Space& space) {
-  const Geometry& geometry = space.geometry;
-  std::vector<double> mean;
-  const int quaternion = geometry.row().quaternion;
-  if (quaternion >= 0) {
-    node.ExpectMap(IdentityMap(geometry) + ", the identity");
-    for (const std::string& element : internal::SplitNames(geometry.row().elements)) {
-      mean.push_back(node.At(element).Number());
-    }
-    node.RejectUnread();
-  } else {
-    mean = node.Numbers(geometry.ambient, space.unit);
+/// Returns the unit quaternion w, x, y, z of R = Rz(yaw) Ry(pitch) Rx(roll).
+std::array<double, 4> QuaternionOf(const std::vector<double>& rpy_deg) {
+  constexpr double kHalfRadian = std::numbers::pi / 360.0;  // half of a degree
+  const auto turn = [&](std::size_t axis) {
+    Eigen::Quaterniond q(std::cos(kHalfRadian * rpy_deg[axis]), 0.0, 0.0, 0.0);
+    q.vec()[static_cast<Eigen::Index>(axis)] = std::sin(kHalfRadian * rpy_deg[axis]);
+    return q;
+  };
+  const Eigen::Quaterniond q = turn(2) * turn(1) * turn(0);
+  return {q.w(), q.x(), q.y(), q.z()};
+}
+
+/// Reads a map of the elements of a geometry that contains a unit quaternion. The key `rpy_deg` may
+/// replace the elements of the quaternion.
+std::vector<double> ReadElements(const Node& node, const Geometry& geometry) {
+  node.ExpectMap(IdentityMap(geometry) +
+                 ", with rpy_deg: [ROLL, PITCH, YAW] in place of a quaternion, or a list");
+  const auto angles = node.Find("rpy_deg");
+  const auto rotation = QuaternionOf(angles ? angles->Numbers(3, "deg") : std::vector(3, 0.0));
+  const auto first = static_cast<std::size_t>(geometry.row().quaternion);
+  std::vector<double> value;
+  for (const std::string& element : internal::SplitNames(geometry.row().elements)) {
+    const std::size_t i = value.size() - first;  // large for an element before the quaternion
+    const bool is_given = angles && i < rotation.size();
+    value.push_back(is_given ? rotation[i] : node.At(element).Number());
   }
-  if (DistanceFrom(geometry, mean.data()) > kUnitTolerance) {
-    node.Fail("the value does not have unit length", "a length within 1e-3 of 1");
-  }
-  if (quaternion >= 0) {
-    internal::ChooseSign({}, std::span(mean).subspan(static_cast<std::size_t>(quaternion), 4));
-  }
-  return mean;
+  node.RejectUnread();
+  return value;
 }
 
 /// Returns the unit of the standard deviations of a block, or "" if its elements differ in units.
@@ -173,7 +181,8 @@ InitialValue ReadInitial(const Node& initial, const Space& space, const std::str
   if (const auto sensor = initial.Find("from_measurement")) {
     value.sensor = sensor->Text();
   } else {
-    value.mean = ReadMean(initial.At("mean", "the initial value", InitialExample(space)), space);
+    value.mean =
+        ReadBlockValue(initial.At("mean", "the initial value", InitialExample(space)), space);
     if (status != BlockStatus::kConstant) {
       value.covariance = ReadCovariance(initial, space);
     } else {
@@ -512,7 +521,8 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
                 Problem& problem) {
   const std::string model_name = entry.At("model", "a sensor entry").Text();
   SensorOptions options{.stream = entry.At("stream", "sensor '" + name + "'").Text()};
-  const Node roles = entry.At("roles", "sensor '" + name + "'", "roles: {ROLE: ENTRY.BLOCK}");
+  const Node roles =
+      entry.At("roles", "sensor '" + name + "'", "roles: ENTRY, or roles: {ROLE: ENTRY.BLOCK}");
   roles.ExpectMap("{ROLE: ENTRY.BLOCK}");
   const SharedSensor model =
       model_name == kFormula
@@ -601,6 +611,21 @@ Problem SelectSensors(Problem problem, const std::vector<std::string>& names) {
 }
 
 }  // namespace
+
+std::vector<double> ReadBlockValue(const Node& node, const Space& space) {
+  const Geometry& geometry = space.geometry;
+  const int quaternion = geometry.row().quaternion;
+  const bool is_map = quaternion >= 0 && node.kind() != Node::Kind::kList;
+  std::vector<double> value =
+      is_map ? ReadElements(node, geometry) : node.Numbers(geometry.ambient, space.unit);
+  if (DistanceFrom(geometry, value.data()) > kUnitTolerance) {
+    node.Fail("the value does not have unit length", "a length within 1e-3 of 1");
+  }
+  if (quaternion >= 0) {
+    internal::ChooseSign({}, std::span(value).subspan(static_cast<std::size_t>(quaternion), 4));
+  }
+  return value;
+}
 
 Problem ReadProblem(const Node& root, const PluginHost& host,
                     const std::vector<std::string>& sensor_names) {

@@ -10,11 +10,20 @@
 
 namespace alidade {
 
+/// Model whose equations are expressions in its config entry. It is part of the program.
+inline constexpr const char* kFormula = "formula";
+
 /// Reads `state`, `sensors`, `landmarks`, `camera` and `initial_time_s` of the root of a config.
 /// `sensor_names` selects the sensors, in this order, and the state entries that these sensors use.
 /// If `sensor_names` is empty, reads all sensors and state entries. Errors: kBadConfig with the
 /// place and a remedy, and kPlugin.
 Problem ReadProblem(const Node& root, const PluginHost& host,
                     const std::vector<std::string>& sensor_names);
+
+/// Reads a value of the space: a number or a list of numbers. A unit quaternion is a list
+/// [w, x, y, z], a map {w: , x: , y: , z: }, or {rpy_deg: [ROLL, PITCH, YAW]}. Error: kBadConfig,
+/// also for a unit vector or unit quaternion whose length differs from 1 by more than
+/// kUnitTolerance.
+std::vector<double> ReadBlockValue(const Node& node, const Space& space);
 
 }  // namespace alidade

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models for tests/plugins/host/check_test.cc. Five of these models have no fault. Each of the
+// Models for tests/plugins/host/check_test.cc. Five of these models have no fault, and
+// `angles` only warns of two. Each of the
 // other models has one fault.
 #include <unistd.h>
 
@@ -17,6 +18,7 @@
 
 #include "alidade/model/plugin.h"
 
+using alidade::Angle;
 using alidade::MatrixRef;
 using alidade::Params;
 using alidade::Quantity;
@@ -45,6 +47,42 @@ struct Right : alidade::Sensor<Vec<2>, Vec<1>, Vec<1>> {
   }
   template <class T>
   void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = l[3] = T(0.5);
+  }
+};
+
+/// Measures a heading as a vector, so that its differences are not wrapped.
+struct UnwrappedHeading : alidade::Sensor<Vec<1>, Angle> {
+  static constexpr std::array kRoles{Quantity{"heading", "rad"}};
+  static constexpr Quantity kMeasurement{"z", "rad"};
+  explicit UnwrappedHeading(Params&) {}
+  template <class T>
+  bool Predict(const T* heading, T* z) const {
+    z[0] = heading[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.5);
+  }
+};
+
+/// Measures two angles of a point. Only the bearing jumps.
+struct UnwrappedBearing : alidade::Sensor<Vec<2>, Vec<2>> {
+  static constexpr std::array kRoles{Quantity{"position", "m"}};
+  static constexpr Quantity kMeasurement{"z", "rad", "", "elevation,bearing"};
+  explicit UnwrappedBearing(Params&) {}
+  template <class T>
+  bool Predict(const T* position, T* z) const {
+    using std::atan2, std::sqrt;
+    const T range = sqrt(position[0] * position[0] + position[1] * position[1]);
+    if (!(range > T(0.01))) return false;
+    z[0] = atan2(T(1.0), range);
+    z[1] = atan2(position[1], position[0]);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
     l[0] = l[3] = T(0.5);
   }
 };
@@ -473,14 +511,16 @@ struct Noisy : alidade::Motion<1, Vec<1>, Vec<1>> {
 #define MOTION(Model, name) ALIDADE_MOTION(Model, name, "", "")
 
 ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
-               SENSOR(Gravity, "gravity"), MOTION(Turning<0>, "turning"),
-               SENSOR(WrongJacobian, "wrong_jacobian"), SENSOR(TwoValues, "two_values"),
-               SENSOR(NotDeterministic, "not_deterministic"), SENSOR(HiddenState, "hidden_state"),
-               SENSOR(Unwritten, "unwritten"), SENSOR(NanOutput, "nan_output"),
-               SENSOR(NanNoise, "nan_noise"), SENSOR(SingularNoise, "singular_noise"),
-               SENSOR(NoNoise, "no_noise"), SENSOR(WrongInverse, "wrong_inverse"),
-               SENSOR(ThrowsInt, "throws_int"), SENSOR(ThrowsInNoise, "throws_in_noise"),
-               SENSOR(HangsInNoise, "hangs_in_noise"), SENSOR(ThrowsInDestroy, "throws_in_destroy"),
+               SENSOR(UnwrappedHeading, "unwrapped_heading"),
+               SENSOR(UnwrappedBearing, "unwrapped_bearing"), SENSOR(Gravity, "gravity"),
+               MOTION(Turning<0>, "turning"), SENSOR(WrongJacobian, "wrong_jacobian"),
+               SENSOR(TwoValues, "two_values"), SENSOR(NotDeterministic, "not_deterministic"),
+               SENSOR(HiddenState, "hidden_state"), SENSOR(Unwritten, "unwritten"),
+               SENSOR(NanOutput, "nan_output"), SENSOR(NanNoise, "nan_noise"),
+               SENSOR(SingularNoise, "singular_noise"), SENSOR(NoNoise, "no_noise"),
+               SENSOR(WrongInverse, "wrong_inverse"), SENSOR(ThrowsInt, "throws_int"),
+               SENSOR(ThrowsInNoise, "throws_in_noise"), SENSOR(HangsInNoise, "hangs_in_noise"),
+               SENSOR(ThrowsInDestroy, "throws_in_destroy"),
                SENSOR(ThrowsInCreate, "throws_in_create"), SENSOR(Misbehaves<1>, "exits"),
                SENSOR(Misbehaves<2>, "crashes"), SENSOR(Misbehaves<10>, "exits_at_once"),
                SENSOR(Misbehaves<11>, "stops_itself"), SENSOR(Misbehaves<3>, "hangs"),

@@ -223,6 +223,30 @@ TEST_F(CheckTest, NamesTheWorstEntryOfAWrongJacobian) {
   EXPECT_NEAR(numeric / y, 1.0, 1e-5) << words;
 }
 
+/// Returns the text of the check `angles`. Expects the given verdict.
+std::string AnglesText(const std::vector<CheckResult>& findings, Verdict verdict) {
+  const auto found = std::ranges::find(findings, "angles", &CheckResult::check);
+  EXPECT_EQ(found->verdict, verdict) << found->text;
+  return found->text;
+}
+
+TEST_F(CheckTest, WarnsOfAnAngleThatIsDeclaredAsAVector) {
+  const auto heading = Checked("unwrapped_heading");
+  EXPECT_EQ(Joined(Failures(heading)), "");
+  double at = 0.0;
+  const std::string text = AnglesText(heading, Verdict::kWarning);
+  const std::string start =
+      "z is a vector in rad, but jumps by 2 pi, so innovations near the jump are wrong by 2 pi; "
+      "declare it as Angle; Predict at heading = ";
+  EXPECT_EQ(text.substr(0, start.size()), start);
+  ASSERT_EQ(std::sscanf(text.substr(start.size()).c_str(), "%lf", &at), 1) << text;
+  EXPECT_NEAR(std::abs(at), 3.14159, 1e-4);
+  EXPECT_EQ(AnglesText(Checked("unwrapped_bearing"), Verdict::kWarning).substr(0, 10),
+            "z.bearing ");
+  EXPECT_FALSE(AnyFailure(heading));
+  AnglesText(Checked("right"), Verdict::kSkipped);
+}
+
 TEST_F(CheckTest, SkipsWhatAFailureLeavesUnsaid) {
   const auto findings = Checked("not_deterministic");
   const auto failed =

@@ -29,7 +29,7 @@ using internal::NumberText;
 /// First character of the child's answer: kError for a set-up error, otherwise one of
 /// kVerdictNames.
 constexpr char kError = 'E';
-constexpr char kVerdictNames[] = {'+', '-', '0'};
+constexpr char kVerdictNames[] = {'+', '-', '0', '!'};
 
 std::string Encode(const CheckResult& finding) {
   return kVerdictNames[static_cast<int>(finding.verdict)] + finding.text;
@@ -203,7 +203,7 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
 }
 
 std::string CheckText(const PluginEntry& entry, const std::vector<CheckResult>& findings) {
-  constexpr const char* kWords[] = {"ok", "FAIL", "skipped"};
+  constexpr const char* kWords[] = {"ok", "FAIL", "skipped", "warning"};
   std::vector<internal::TextRow> rows;
   std::array<int, std::size(kWords)> counts{};
   for (const CheckResult& finding : findings) {
@@ -219,6 +219,7 @@ std::string CheckText(const PluginEntry& entry, const std::vector<CheckResult>& 
          internal::TextTable(rows, 2) + std::to_string(findings.size()) +
          " checks: " + count(CheckResult::Verdict::kOk, " ok, ") +
          count(CheckResult::Verdict::kFail, " failed, ") +
+         (counts.back() > 0 ? count(CheckResult::Verdict::kWarning, " warned, ") : "") +
          count(CheckResult::Verdict::kSkipped, " skipped\n");
 }
 

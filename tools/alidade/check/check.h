@@ -32,7 +32,7 @@ struct CheckOptions {
 
 /// Result of one check.
 struct CheckResult {
-  enum class Verdict { kOk, kFail, kSkipped };
+  enum class Verdict { kOk, kFail, kSkipped, kWarning };
   Verdict verdict = Verdict::kSkipped;
   std::string check;  ///< name of the check, as in `jacobian`
   std::string text;   ///< description of the result; a failure includes the call and the state

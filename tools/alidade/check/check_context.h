@@ -71,6 +71,10 @@ inline CheckResult Skip(std::string text) {
   return {CheckResult::Verdict::kSkipped, "", std::move(text)};
 }
 
+inline CheckResult Warn(std::string text) {
+  return {CheckResult::Verdict::kWarning, "", std::move(text)};
+}
+
 struct Check {
   const char* name;
   CheckResult (*run)(Context&);
@@ -95,6 +99,7 @@ CheckResult CheckDoubleCover(Context& context);
 CheckResult CheckInitialise(Context& context);
 CheckResult CheckStep(Context& context);
 CheckResult CheckNoiseKind(Context& context);
+CheckResult CheckAngles(Context& context);
 
 inline constexpr Check kChecks[] = {
     {"create", CheckCreate, true},
@@ -112,6 +117,7 @@ inline constexpr Check kChecks[] = {
     {"initialise", CheckInitialise, false},
     {"step", CheckStep, false},
     {"noise_kind", CheckNoiseKind, false},
+    {"angles", CheckAngles, false},
     {"leaks", CheckLeaks, false},
 };
 

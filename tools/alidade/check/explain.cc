@@ -87,10 +87,28 @@ std::string TypesText(const Experiment& experiment) {
   return text;
 }
 
+/// Appends a row with path and value for each value of `map` that the program filled in.
+void AppendFilled(const Node& map, const std::string& prefix, std::vector<TextRow>& rows) {
+  for (const auto& [name, value] : map.Entries()) {
+    if (value.is_map()) {
+      AppendFilled(value, prefix + name + '.', rows);
+    } else if (value.is_filled()) {
+      rows.push_back({prefix + name, internal::ValueText(value)});
+    }
+  }
+}
+
+/// Returns the values that the config does not contain, or contains as short forms.
+std::string FilledText(const Config& config) {
+  std::vector<TextRow> rows;
+  AppendFilled(config.root(), "", rows);
+  return rows.empty() ? "" : "\nfilled in (short forms and defaults)\n" + TextTable(rows, kIndent);
+}
+
 }  // namespace
 
 std::string Explain(const Config& config, const Experiment& experiment) {
-  std::string text = internal::ExplainSource(config, experiment);
+  std::string text = internal::ExplainSource(config, experiment) + FilledText(config);
   const double step_s = internal::NominalStep(config);
   const std::vector<ExplainedProblem> problems = internal::ExplainProblems(experiment, step_s);
   for (std::size_t i = 0; i < problems.size(); ++i) {

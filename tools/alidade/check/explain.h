@@ -7,7 +7,8 @@
 
 namespace alidade {
 
-/// Describes `experiment`, which was built from `config`, without running it. For each estimator
+/// Describes `experiment` without running it. `config` is its config with expanded short forms
+/// (Experiment::config). The text lists the values that were filled in. For each estimator
 /// the text lists the blocks and their initial values, the motion models and the sensors. It also
 /// lists the unobservable directions of the state, the options and the capabilities.
 std::string Explain(const Config& config, const Experiment& experiment);

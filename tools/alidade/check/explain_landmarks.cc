@@ -50,11 +50,11 @@ std::vector<TextRow> LandmarkRows(const Problem& problem) {
   if (options.negative_depth == LandmarkOptions::NegativeDepth::kDelete) {
     prune.emplace_back("inverse distance not positive");
   }
-  add("prune", prune.empty() ? "never" : Join(prune, "; "));
+  add("prune", prune.empty() ? "none" : Join(prune, "; "));
   add("convert to xyz",
       options.max_linearity_index > 0.0
           ? "if the linearity index is below " + NumberText(options.max_linearity_index)
-          : "never");
+          : "none");
   if (!options.known.empty()) add("known", std::to_string(options.known.size()));
   return rows;
 }

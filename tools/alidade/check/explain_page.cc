@@ -118,7 +118,8 @@ void AppendKeys(const Node& map, const std::string& path, const std::string& ent
     const std::string relative = is_inside ? key.substr(entry_path.size() + 1) : key;
     const auto info = std::ranges::find(keys, relative, &ParamInfo::key);
     const bool is_known = info != keys.end();
-    const std::string text = value.kind() == Node::Kind::kScalar ? value.Text() : value.ToYaml();
+    std::string text = value.kind() == Node::Kind::kScalar ? value.Text() : value.ToYaml();
+    if (value.is_filled()) text += " (filled in)";
     rows.push_back({key, text, is_known ? info->unit : "", is_known ? info->doc : ""});
   }
 }

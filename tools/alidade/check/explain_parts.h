@@ -52,6 +52,8 @@ const char* StatusText(BlockStatus status);
 /// Returns the initial value of a block, such as `0.3 +- 0.1`.
 std::string PriorText(const Prior& prior, const Block& block);
 
+/// Returns the text of a scalar or of a list of scalars.
+std::string ValueText(const Node& value);
 /// Describes the source of an experiment: its streams, keys and truth.
 std::string ExplainSource(const Config& config, const Experiment& experiment);
 /// Returns the sensors and the control inputs that use a stream.

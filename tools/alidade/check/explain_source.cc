@@ -33,9 +33,7 @@ void AddCalibration(const Node& map, const std::string& key, std::vector<TextRow
       AddCalibration(value, path, rows);
       continue;
     }
-    std::vector<std::string> texts;
-    for (const Node& item : value.ItemsOrOne()) texts.push_back(item.Text());
-    rows.push_back({path, Join(texts), ToString(value.place())});
+    rows.push_back({path, ValueText(value), ToString(value.place())});
   }
 }
 
@@ -59,6 +57,12 @@ std::string SourceKeys(const Node& source) {
 }
 
 }  // namespace
+
+std::string ValueText(const Node& value) {
+  std::vector<std::string> texts;
+  for (const Node& item : value.ItemsOrOne()) texts.push_back(item.Text());
+  return Join(texts);
+}
 
 std::vector<std::string> UsersOf(const Config& config, const std::string& stream) {
   std::vector<std::string> users;

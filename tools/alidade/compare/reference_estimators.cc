@@ -184,6 +184,7 @@ ComparedExperiment Build(const Config& config, const PluginHost& host,
     base = base.Copy();
   }
   ComparedExperiment compared{base, BuildExperiment(base, host), "", {}, {}};
+  compared.config = *compared.experiment.config;
   const int filter = FindFilter(compared.experiment, options.filter);
   if (filter < 0 || !options.decompose) CheckReference(compared.experiment, options.reference);
   if (filter < 0) return compared;

@@ -1,0 +1,337 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/short_forms.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "alidade/base/text.h"
+#include "alidade/config/tree.h"
+#include "alidade/experiment/estimator_plugin.h"
+#include "alidade/experiment/estimator_registry.h"
+#include "alidade/experiment/read_problem.h"
+#include "alidade/formula/formula_motion.h"
+
+namespace alidade {
+namespace {
+
+using internal::Child;
+using internal::FailAt;
+using internal::FillCopy;
+using internal::FillMap;
+using internal::FillNumbers;
+using internal::FillText;
+using internal::Join;
+using internal::KeyPlace;
+using internal::PathOf;
+using internal::Quoted;
+using internal::Remove;
+
+/// Returns the map `key` of `map`, or null if `map` does not contain such a map.
+ConfigTree* ChildMap(const ConfigTree& map, std::string_view key) {
+  ConfigTree* const child = Child(map, key);
+  return child != nullptr && child->kind == Node::Kind::kMap ? child : nullptr;
+}
+
+/// Returns the scalar `key` of `map`, or null if `map` does not contain such a scalar.
+ConfigTree* ChildText(const ConfigTree& map, std::string_view key) {
+  ConfigTree* const child = Child(map, key);
+  return child != nullptr && child->kind == Node::Kind::kScalar ? child : nullptr;
+}
+
+/// Returns the first component of each key that an estimator of this type reads.
+std::set<std::string> KeysOfType(const std::string& type, const PluginHost& host) {
+  std::set<std::string> keys = {"type",   "sensors",       "overrides",        "use",
+                                "expect", "on_divergence", "on_plugin_failure"};
+  const auto add = [&](const std::vector<ParamInfo>& schema) {
+    for (const ParamInfo& info : schema) keys.insert(info.key.substr(0, info.key.find('.')));
+  };
+  if (const auto* const built_in = internal::FindEstimatorType(type)) add(built_in->schema());
+  for (const PluginEntry& entry : host.entries()) {
+    if (entry.kind == kEstimatorKind && entry.name == type) add(EstimatorSchema(entry));
+  }
+  return keys;
+}
+
+/// Moves the keys of the map `defaults` into the estimators whose types have these keys. An
+/// estimator without a type has the type of `defaults`, or else the type that its name states.
+void ExpandEstimators(ConfigTree& root, const PluginHost& host) {
+  const ConfigTree* const estimators = ChildMap(root, "estimators");
+  if (estimators == nullptr) return;
+  const ConfigTree* const defaults = Child(root, "defaults");
+  if (defaults != nullptr) Node(defaults).ExpectMap("{gate: 0.999}");
+  const ConfigTree* const type = defaults == nullptr ? nullptr : Child(*defaults, "type");
+  std::set<std::string> known_keys;
+  for (const auto& entry : estimators->children) {
+    if (entry->kind != Node::Kind::kMap) continue;
+    if (type != nullptr) FillCopy(*entry, *type);
+    if (Child(*entry, "type") == nullptr) FillText(*entry, "type", entry->key);
+    if (defaults == nullptr) continue;
+    const std::set<std::string> keys = KeysOfType(Child(*entry, "type")->text, host);
+    known_keys.insert(keys.begin(), keys.end());
+    for (const auto& value : defaults->children) {
+      if (keys.contains(value->key)) FillCopy(*entry, *value);
+    }
+  }
+  if (defaults == nullptr) return;
+  for (const auto& value : defaults->children) {
+    if (known_keys.contains(value->key)) continue;
+    const std::string nearest = Nearest(value->key, known_keys);
+    FailAt(KeyPlace(*value), PathOf(*value), "no estimator of this config has this key",
+           nearest.empty() ? "one of " + Join({known_keys.begin(), known_keys.end()}) : "",
+           nearest);
+  }
+  Remove(root, "defaults");
+}
+
+/// Replaces `exact` by the mean and the sigma 0. Adds `mean` to a map that contains neither a mean
+/// nor `from_measurement`.
+void ExpandInitial(ConfigTree* value, const std::vector<double>& mean) {
+  if (value == nullptr) return;
+  if (value->kind == Node::Kind::kScalar && value->text == "exact") {
+    FillMap(*value);
+    FillNumbers(*value, "mean", mean);
+    FillNumbers(*value, "sigma", {0.0});
+  } else if (value->kind == Node::Kind::kMap && Child(*value, "mean") == nullptr &&
+             Child(*value, "from_measurement") == nullptr) {
+    FillNumbers(*value, "mean", mean);
+  }
+}
+
+/// Blocks of each state entry, with their names in the config.
+using Blocks = std::map<std::string, std::vector<Space>, std::less<>>;
+
+/// Expands the initial values of the state entries. Returns their blocks.
+Blocks ExpandStates(const ConfigTree& root, const PluginHost& host) {
+  Blocks blocks;
+  const ConfigTree* const state = ChildMap(root, "state");
+  if (state == nullptr) return blocks;
+  for (const auto& entry : state->children) {
+    if (entry->kind != Node::Kind::kMap) continue;
+    const ConfigTree* const model = ChildText(*entry, "model");
+    if (model == nullptr) continue;
+    const bool is_formula = model->text == kFormula;
+    const SharedMotion motion = is_formula ? internal::CreateFormulaMotion(Node(entry.get()))
+                                           : host.CreateMotion(model->text, Node(entry.get()));
+    const ConfigTree* const renamed = is_formula ? nullptr : ChildMap(*entry, "blocks");
+    const ConfigTree* const initial = ChildMap(*entry, "initial");
+    for (Space block : motion->blocks()) {
+      const ConfigTree* const name = renamed == nullptr ? nullptr : ChildText(*renamed, block.name);
+      if (name != nullptr) block.name = name->text;
+      if (initial != nullptr) ExpandInitial(Child(*initial, block.name), block.geometry.Identity());
+      blocks[entry->key].push_back(block);
+    }
+  }
+  return blocks;
+}
+
+/// Returns whether the geometry of the block is that of the role, and the units do not differ.
+bool Fits(const Space& block, const Space& role) {
+  return block.geometry == role.geometry &&
+         (block.unit.empty() || role.unit.empty() || block.unit == role.unit);
+}
+
+/// Block of a state entry, with its name in the form ENTRY.BLOCK.
+struct NamedBlock {
+  std::string name;
+  const Space* space;
+};
+
+/// Returns the names of the blocks that fit the role, without those in `excluded`.
+std::vector<std::string> FittingNames(const std::vector<NamedBlock>& blocks, const Space& role,
+                                      const std::set<std::string>& excluded = {}) {
+  std::vector<std::string> names;
+  for (const NamedBlock& block : blocks) {
+    if (Fits(*block.space, role) && !excluded.contains(block.name)) names.push_back(block.name);
+  }
+  return names;
+}
+
+/// Returns the blocks of the entries in `roles`, which is the name of a state entry or a list of
+/// such names.
+std::vector<NamedBlock> BlocksOf(const Node& roles, const Blocks& blocks) {
+  std::vector<NamedBlock> named;
+  for (const Node& item : roles.ItemsOrOne()) {
+    const std::string entry = item.Text();
+    const auto found = blocks.find(entry);
+    if (found == blocks.end()) {
+      std::vector<std::string> entries;
+      for (const auto& [name, spaces] : blocks) entries.push_back(name);
+      item.Fail("state entry " + Quoted(entry) + " does not exist",
+                Join(entries) + ", or a map {ROLE: ENTRY.BLOCK}", Nearest(entry, entries));
+    }
+    for (const Space& block : found->second) named.push_back({entry + '.' + block.name, &block});
+  }
+  return named;
+}
+
+/// Returns whether the model needs a block for the role.
+bool IsNeeded(const Space& role) {
+  return !role.landmark() && !role.optional() && (role.flags & ALIDADE_ROLE_OWNED) == 0;
+}
+
+/// Rejects a role that `candidates` do not determine.
+[[noreturn]] void FailRole(const Node& roles, const Space& role, const SensorModel& model,
+                           const std::vector<std::string>& candidates, const Blocks& blocks) {
+  std::vector<std::string> names = candidates;
+  if (names.empty()) {
+    for (const auto& [entry, spaces] : blocks) {
+      for (const Space& block : spaces) {
+        if (Fits(block, role)) names.push_back(entry + '.' + block.name);
+      }
+    }
+  }
+  roles.Fail(
+      (candidates.empty() ? "no block fits" : "several blocks fit") + std::string(" role '") +
+          role.name + "' of model '" + model.name() + "' (" + ToString(role.geometry) +
+          (role.unit.empty() ? "" : ", " + role.unit) + ')',
+      "a map with " + role.name + ": " + (names.empty() ? "ENTRY.BLOCK" : Join(names, " or ")));
+}
+
+/// Binds the roles of `model` to the blocks `offered`. A role is bound to the block that has its
+/// name and fits. If no block has this name and the model needs the role, it is bound to the only
+/// other block that fits.
+void BindRoles(ConfigTree& roles, const SensorModel& model, const std::vector<NamedBlock>& offered,
+               const Blocks& blocks) {
+  const Node node(&roles);
+  std::map<std::string, std::string> bound;  // role -> block
+  std::set<std::string> used;
+  const auto bind = [&](const Space& role, const std::vector<std::string>& candidates) {
+    if (candidates.size() != 1) FailRole(node, role, model, candidates, blocks);
+    bound[role.name] = candidates.front();
+    used.insert(candidates.front());
+  };
+  for (const Space& role : model.roles()) {
+    std::vector<NamedBlock> same_name = offered;
+    std::erase_if(same_name,
+                  [&](const NamedBlock& block) { return block.space->name != role.name; });
+    const std::vector<std::string> candidates = FittingNames(same_name, role);
+    if (!role.landmark() && !candidates.empty()) bind(role, candidates);
+  }
+  for (const Space& role : model.roles()) {
+    const bool is_open = IsNeeded(role) && !bound.contains(role.name);
+    if (is_open) bind(role, FittingNames(offered, role, used));
+  }
+  FillMap(roles);
+  for (const Space& role : model.roles()) {
+    if (bound.contains(role.name)) FillText(roles, role.name, bound[role.name]);
+  }
+}
+
+/// Binds each block to a role of the same name, if no earlier block has this name.
+void BindEachBlock(ConfigTree& roles, const std::vector<NamedBlock>& offered) {
+  FillMap(roles);
+  for (const NamedBlock& block : offered) {
+    const std::string& role = block.space->name;
+    if (Child(roles, role) == nullptr) FillText(roles, role, block.name);
+  }
+}
+
+/// Returns the geometry of the block that each role of the map `roles` is bound to. Omits roles
+/// whose block does not exist.
+std::map<std::string, std::string> BoundGeometries(const ConfigTree& roles, const Blocks& blocks) {
+  std::map<std::string, std::string> geometries;
+  for (const auto& role : roles.children) {
+    const ConfigTree* const block =
+        role->kind == Node::Kind::kMap ? Child(*role, "block") : role.get();
+    if (block == nullptr) continue;
+    for (const auto& [entry, spaces] : blocks) {
+      for (const Space& space : spaces) {
+        if (entry + '.' + space.name == block->text) {
+          geometries[role->key] = ToString(space.geometry);
+        }
+      }
+    }
+  }
+  return geometries;
+}
+
+/// Adds the role `landmark` and the means of the states that the sensor owns.
+void FillFromModel(ConfigTree& entry, const SensorModel& model) {
+  ConfigTree* const roles = ChildMap(entry, "roles");
+  if (roles != nullptr && model.has_landmark() && Child(*roles, "landmark") == nullptr) {
+    FillText(*roles, "landmark", "landmarks");
+  }
+  const ConfigTree* const initial = ChildMap(entry, "initial");
+  if (initial == nullptr) return;
+  for (std::size_t i = 0; i < model.roles().size(); ++i) {
+    const Space& role = model.roles()[i];
+    if ((role.flags & ALIDADE_ROLE_OWNED) == 0) continue;
+    ExpandInitial(Child(*initial, role.name), model.owned(i).mean);
+  }
+}
+
+void ExpandSensor(ConfigTree& entry, const PluginHost& host, const Blocks& blocks) {
+  ExpandInitial(ChildMap(entry, "time_offset_s"), {0.0});
+  const ConfigTree* const model_name = ChildText(entry, "model");
+  ConfigTree* const roles = Child(entry, "roles");
+  if (model_name == nullptr || roles == nullptr) return;
+  std::vector<NamedBlock> offered;
+  const bool has_names = roles->kind == Node::Kind::kScalar || roles->kind == Node::Kind::kList;
+  if (has_names) {
+    offered = BlocksOf(Node(roles), blocks);
+    BindEachBlock(*roles, offered);
+  }
+  if (model_name->text == kFormula) return;
+  // The geometries of the blocks select the variant of the model.
+  const SharedSensor model =
+      host.CreateSensor(model_name->text, Node(&entry), {}, BoundGeometries(*roles, blocks));
+  if (has_names) BindRoles(*roles, *model, offered, blocks);
+  FillFromModel(entry, *model);
+}
+
+void ExpandSensors(const ConfigTree& root, const PluginHost& host, const Blocks& blocks) {
+  const ConfigTree* const sensors = ChildMap(root, "sensors");
+  if (sensors == nullptr || blocks.empty()) return;  // the reader reports a missing `state`
+  for (const auto& entry : sensors->children) {
+    if (entry->kind == Node::Kind::kMap) ExpandSensor(*entry, host, blocks);
+  }
+}
+
+/// Replaces `distance_m: [NEAR, FAR]` by the Gaussian of the inverse distance whose mean -+ 2 sigma
+/// are 1 / FAR and 1 / NEAR. If FAR is `none`, 1 / FAR is 0, as in [Civera2008].
+void ExpandPrior(ConfigTree& prior) {
+  const ConfigTree* const distance = Child(prior, "distance_m");
+  if (distance == nullptr) return;
+  for (const char* const key : {"inverse_distance", "sigma"}) {
+    const ConfigTree* const other = Child(prior, key);
+    if (other == nullptr) continue;
+    if (!other->is_filled) {
+      FailAt(KeyPlace(*other), PathOf(*other), "the prior is also defined by `distance_m`",
+             "distance_m, or inverse_distance and sigma");
+    }
+    Remove(prior, key);
+  }
+  constexpr const char* kExpected = "[NEAR, FAR] in m, or [NEAR, none]";
+  const Node node(distance);
+  if (node.kind() != Node::Kind::kList) node.Fail("the value is not a list", kExpected);
+  const std::vector<Node> items = node.Items();
+  if (items.size() != 2) node.Fail("the list does not have 2 items", kExpected);
+  constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+  const double near_m = items[0].Number(0.0, kNoLimit, true, true, "m");
+  const bool is_bounded = items[1].kind() != Node::Kind::kScalar || items[1].Text() != "none";
+  const double nearest = 1.0 / near_m;
+  const double farthest =
+      is_bounded ? 1.0 / items[1].Number(near_m, kNoLimit, true, true, "m") : 0.0;
+  constexpr double kSigmas = 4.0;  // from mean - 2 sigma to mean + 2 sigma
+  FillNumbers(prior, "inverse_distance", {(nearest + farthest) / 2.0});
+  FillNumbers(prior, "sigma", {(nearest - farthest) / kSigmas});
+  Remove(prior, "distance_m");
+}
+
+}  // namespace
+
+void ExpandShortForms(Config& config, const PluginHost& host) {
+  ConfigTree& root = config.tree();
+  ExpandEstimators(root, host);
+  const Blocks blocks = ExpandStates(root, host);
+  ExpandSensors(root, host, blocks);
+  if (const ConfigTree* const landmarks = ChildMap(root, "landmarks")) {
+    if (ConfigTree* const prior = ChildMap(*landmarks, "prior")) ExpandPrior(*prior);
+  }
+}
+
+}  // namespace alidade

@@ -48,6 +48,8 @@ void Select(const Sigmas& sigmas, Params& p, AlidadeInstance* instance) {
     p.Fail("",
            "the radar measures nothing; expected sigma_range_m, sigma_azimuth_rad or "
            "sigma_range_rate_m_s");
+    // An instance of all quantities, from which the host reads the roles.
+    Emplace<D, true, true, true>(sigmas, instance);
   }
 }
 

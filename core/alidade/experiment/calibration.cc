@@ -4,9 +4,8 @@
 #include <optional>
 #include <vector>
 
-#include "alidade/experiment/calibration_file.h"
-
 #include "alidade/config/tree.h"
+#include "alidade/experiment/calibration_file.h"
 
 namespace alidade::internal {
 namespace {

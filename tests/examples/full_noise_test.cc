@@ -16,6 +16,7 @@
 #include "alidade/estimation/ekf.h"
 #include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/run.h"
+#include "alidade/experiment/short_forms.h"
 #include "sensors/inverse_depth_feature.h"
 
 namespace alidade {
@@ -53,25 +54,28 @@ struct CorrelatedPixel : LandmarkSensor<CorrelatedPixel<Representation>, Vec<2>,
   }
 };
 
-/// Returns the config of example 12, with R given by `covariance` instead of `sigma_px`.
-Config WithCovariance(const std::string& covariance) {
+/// Returns the config of example 12, with R given by `covariance` instead of `sigma_px`, and with
+/// expanded short forms.
+Config WithCovariance(const std::string& covariance, const PluginHost& host) {
   const std::string path = ALIDADE_SOURCE_DIR "/examples/12_slam_parameters/config.yaml";
   std::ifstream file(path);
   std::string text(std::istreambuf_iterator<char>(file), {});
   const std::size_t at = text.find("    sigma_px: 1.0", text.find("  pixels:"));
   EXPECT_NE(at, std::string::npos);
   text.replace(at, text.find('\n', at) - at, "    covariance: " + covariance);
-  return Config::FromText(text, path);
+  Config config = Config::FromText(text, path);
+  ExpandShortForms(config, host);
+  return config;
 }
 
 TEST(FullNoise, OfAConfigAndOfAModelIsThatOfEachMeasurement) {
-  const Config config = WithCovariance("[[1, 0.6], [0.6, 4]]");
   const PluginHost host;
+  const Config config = WithCovariance("[[1, 0.6], [0.6, 4]]", host);
   const std::unique_ptr<Source> source = std::move(BuildExperiment(config, host).source);
   Problem problem = ReadProblem(config.root(), host, {"pixels"});
   const std::vector<StreamInfo> streams = source->streams();
   Ekf by_config(problem, {}, streams);
-  const Config other = WithCovariance("[[9, 0], [0, 9]]");
+  const Config other = WithCovariance("[[9, 0], [0, 9]]", host);
   Ekf by_measurement(ReadProblem(other.root(), host, {"pixels"}), {}, streams);
   const Camera camera(640, 480, 525.0, 525.0, 320.0, 240.0);
   problem.sensors.at(0).model =

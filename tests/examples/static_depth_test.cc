@@ -10,6 +10,7 @@
 #include "alidade/estimation/ekf.h"
 #include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/run.h"
+#include "alidade/experiment/short_forms.h"
 #include "examples/09_static_depth/measurements.h"
 
 namespace alidade {
@@ -41,8 +42,9 @@ TEST(StaticDepth, ItsNumbersAreThoseOfExample05) {
 }
 
 TEST(StaticDepth, PrintsWhatTheEngineEstimates) {
-  const Config config = Example05();
+  Config config = Example05();
   const PluginHost host;
+  ExpandShortForms(config, host);
   const Problem problem = ReadProblem(config.root(), host, {});
   EkfOptions options;
   options.gate = 0.9999;

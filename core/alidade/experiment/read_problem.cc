@@ -487,6 +487,14 @@ RobustLoss ReadLoss(const Node& node) {
   return *loss;
 }
 
+/// Returns the node with the block of a role, or nothing if the map `role` does not contain it.
+/// ReadRole reads the other keys of the map later.
+std::optional<Node> FindBlockNode(const Node& role) {
+  if (!role.is_map()) return role;
+  for (const char* key : {"mode", "jacobian_at"}) role.Declare(key);
+  return role.Find("block");
+}
+
 /// Creates a sensor from the expressions in its entry. Its roles have the geometries, units and
 /// elements of the blocks to which they are bound.
 SharedSensor CreateFormula(const Node& entry, const Node& roles, const Problem& problem) {
@@ -497,8 +505,9 @@ SharedSensor CreateFormula(const Node& entry, const Node& roles, const Problem& 
       has_landmark = true;
       continue;
     }
-    const Node block = node.is_map() ? node.At("block", "a role") : node;
-    bound_roles.push_back(problem.layout[FindBlock(block, problem)].space);
+    const std::optional<Node> block = FindBlockNode(node);
+    bound_roles.push_back(
+        problem.layout[FindBlock(block ? *block : node.At("block", "a role"), problem)].space);
     bound_roles.back().name = name;
     bound_roles.back().flags = 0;
   }
@@ -510,7 +519,7 @@ SharedSensor CreateFormula(const Node& entry, const Node& roles, const Problem& 
 std::map<std::string, std::string> BoundGeometries(const Node& roles, const Problem& problem) {
   std::map<std::string, std::string> geometries;
   for (const auto& [role, node] : roles.Entries()) {
-    const std::optional<Node> block = node.is_map() ? node.Find("block") : node;
+    const std::optional<Node> block = FindBlockNode(node);
     const BlockId id = block ? problem.layout.Find(block->Text()) : -1;
     if (id >= 0) geometries[role] = ToString(problem.layout[id].geometry());
   }

@@ -10,9 +10,6 @@
 
 namespace alidade {
 
-/// Model whose equations are expressions in its config entry. It is part of the program.
-inline constexpr const char* kFormula = "formula";
-
 /// Reads `state`, `sensors`, `landmarks`, `camera` and `initial_time_s` of the root of a config.
 /// `sensor_names` selects the sensors, in this order, and the state entries that these sensors use.
 /// If `sensor_names` is empty, reads all sensors and state entries. Errors: kBadConfig with the

@@ -12,8 +12,8 @@
 #include "alidade/config/tree.h"
 #include "alidade/experiment/estimator_plugin.h"
 #include "alidade/experiment/estimator_registry.h"
-#include "alidade/experiment/read_problem.h"
 #include "alidade/formula/formula_motion.h"
+#include "alidade/formula/formula_name.h"
 
 namespace alidade {
 namespace {
@@ -26,6 +26,7 @@ using internal::FillNumbers;
 using internal::FillText;
 using internal::Join;
 using internal::KeyPlace;
+using internal::kFormula;
 using internal::PathOf;
 using internal::Quoted;
 using internal::Remove;
@@ -44,8 +45,8 @@ ConfigTree* ChildText(const ConfigTree& map, std::string_view key) {
 
 /// Returns the first component of each key that an estimator of this type reads.
 std::set<std::string> KeysOfType(const std::string& type, const PluginHost& host) {
-  std::set<std::string> keys = {"type",   "sensors",       "overrides",        "use",
-                                "expect", "on_divergence", "on_plugin_failure"};
+  std::set<std::string> keys = {"type",   "sensors",       "overrides",         "use",
+                                "expect", "on_divergence", "on_plugin_failure", "invariant_error"};
   const auto add = [&](const std::vector<ParamInfo>& schema) {
     for (const ParamInfo& info : schema) keys.insert(info.key.substr(0, info.key.find('.')));
   };
@@ -168,9 +169,10 @@ std::vector<NamedBlock> BlocksOf(const Node& roles, const Blocks& blocks) {
   return named;
 }
 
-/// Returns whether the model needs a block for the role.
-bool IsNeeded(const Space& role) {
-  return !role.landmark() && !role.optional() && (role.flags & ALIDADE_ROLE_OWNED) == 0;
+/// Returns whether a state entry may fill the role: it belongs neither to a landmark nor to the
+/// sensor.
+bool IsOfEntry(const Space& role) {
+  return !role.landmark() && (role.flags & ALIDADE_ROLE_OWNED) == 0;
 }
 
 /// Rejects a role that `candidates` do not determine.
@@ -209,10 +211,10 @@ void BindRoles(ConfigTree& roles, const SensorModel& model, const std::vector<Na
     std::erase_if(same_name,
                   [&](const NamedBlock& block) { return block.space->name != role.name; });
     const std::vector<std::string> candidates = FittingNames(same_name, role);
-    if (!role.landmark() && !candidates.empty()) bind(role, candidates);
+    if (IsOfEntry(role) && !candidates.empty()) bind(role, candidates);
   }
   for (const Space& role : model.roles()) {
-    const bool is_open = IsNeeded(role) && !bound.contains(role.name);
+    const bool is_open = IsOfEntry(role) && !role.optional() && !bound.contains(role.name);
     if (is_open) bind(role, FittingNames(offered, role, used));
   }
   FillMap(roles);

@@ -13,6 +13,7 @@
 #include "alidade/check/plugin_listing.h"
 #include "alidade/experiment/estimator_registry.h"
 #include "alidade/experiment/read_problem.h"
+#include "alidade/experiment/short_forms.h"
 #include "alidade/formula/formula_name.h"
 #include "alidade/io/text_table.h"
 #include "alidade/plugin/create.h"
@@ -129,7 +130,9 @@ std::vector<CheckResult> CheckModel(const PluginEntry& entry, const Node& parame
 std::vector<FormulaCheck> CheckFormulas(const Config& config, const PluginHost& host,
                                         const CheckOptions& options) {
   constexpr unsigned kRungeKuttaOrder = 5;  // the error of a step of the Runge-Kutta method
-  const Problem problem = ReadProblem(config.root(), host, {});
+  Config expanded = config.Copy();
+  ExpandShortForms(expanded, host);
+  const Problem problem = ReadProblem(expanded.root(), host, {});
   std::vector<FormulaCheck> checks;
   const auto add = [&](const char* kind, const std::string& path, const auto& create) {
     PluginEntry entry;

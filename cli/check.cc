@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "alidade/experiment/calibration.h"
+#include "alidade/formula/formula_name.h"
 #include "command.h"
 #include "console.h"
 
@@ -135,12 +136,12 @@ bool CheckAllAndPrint(const std::vector<PluginEntry>& entries, const Config& con
   return failed;
 }
 
-/// Checks the formulas in the config of a run, and prints the findings. Returns true if a check
-/// failed.
-bool CheckFormulasAndPrint(const Config& config, const PluginHost& host,
-                           const CheckOptions& options) {
+/// Checks the models whose equations are in the config of a run, and prints the findings. Returns
+/// true if a check failed.
+bool CheckConfigModelsAndPrint(const Config& config, const PluginHost& host,
+                               const std::string& model, const CheckOptions& options) {
   bool failed = false;
-  for (const FormulaCheck& check : CheckFormulas(config, host, options)) {
+  for (const ConfigModelCheck& check : CheckConfigModels(config, host, model, options)) {
     PrintText(check.path + ": " + CheckText(check.entry, check.findings));
     failed = AnyFailure(check.findings) || failed;
   }
@@ -157,13 +158,16 @@ ExitCode Check(const CheckArguments& arguments) {
   }
   for (const fs::path& path : Absolute(arguments.plugin_paths)) places.push_back(path);
   const PluginHost host(places);
-  if (arguments.plugin == "formula") {
+  if (internal::HasEquationsInConfig(arguments.plugin)) {
     if (!config) {
-      throw Error(ExitCode::kUsage,
-                  ErrorLine({}, {}, "the equations of a formula are in a config", "--config FILE"));
+      throw Error(
+          ExitCode::kUsage,
+          ErrorLine({}, {}, "the equations of the model " + arguments.plugin + " are in a config",
+                    "--config FILE"));
     }
-    return CheckFormulasAndPrint(*config, host, arguments.options) ? ExitCode::kFound
-                                                                   : ExitCode::kOk;
+    const bool failed =
+        CheckConfigModelsAndPrint(*config, host, arguments.plugin, arguments.options);
+    return failed ? ExitCode::kFound : ExitCode::kOk;
   }
   const auto entries = FindModels(host, arguments.plugin, arguments.model);
   const bool failed = config ? CheckAllAndPrint(entries, *config, arguments.options)

@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "alidade/formula/formula_motion.h"
 #include "alidade/formula/formula_sensor.h"
+#include "alidade/formula/linear_motion.h"
+#include "alidade/formula/linear_sensor.h"
 #include "alidade/state/element_names.h"
+#include "alidade/testing/jacobians.h"
 #include "support/config_text.h"
 
-/// Formula models from YAML texts. For tests.
+/// Formula models and linear models from YAML texts. For tests.
 namespace alidade::testing {
 
 inline Space NamedSpace(const std::string& name, const Geometry& geometry,
@@ -41,6 +45,32 @@ inline SharedMotion FormulaMotionOf(const std::string& yaml) {
   SharedMotion motion = internal::CreateFormulaMotion(config.root());
   config.root().RejectUnread();
   return motion;
+}
+
+inline SharedSensor LinearSensorOf(const std::string& yaml, const std::vector<Space>& roles) {
+  const Config config = Read(yaml);
+  SharedSensor sensor = internal::CreateLinearSensor(config.root(), roles);
+  config.root().RejectUnread();
+  return sensor;
+}
+inline SharedMotion LinearMotionOf(const std::string& yaml) {
+  const Config config = Read(yaml);
+  SharedMotion motion = internal::CreateLinearMotion(config.root());
+  config.root().RejectUnread();
+  return motion;
+}
+
+/// Returns Q = G L L' G' of a step, row-major.
+inline std::vector<double> ProcessNoise(const SharedMotion& motion, const Blocks& x,
+                                        const double* u, double dt_s) {
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const int n = motion->tangent_size(), n_w = motion->noise_size();
+  const auto step = StepWithJacobians(motion, x, u, nullptr, dt_s);
+  RowMajor l(n_w, n_w);
+  EXPECT_EQ(motion->SqrtQ(Pointers(x).data(), u, dt_s, l.data()), Status::kOk);
+  const RowMajor g = Eigen::Map<const RowMajor>(step.g.data(), n, n_w) * l;
+  const RowMajor q = g * g.transpose();
+  return {q.data(), q.data() + q.size()};
 }
 
 /// Returns h at the given roles.

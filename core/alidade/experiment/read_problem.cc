@@ -22,6 +22,8 @@
 #include "alidade/formula/formula_motion.h"
 #include "alidade/formula/formula_name.h"
 #include "alidade/formula/formula_sensor.h"
+#include "alidade/formula/linear_motion.h"
+#include "alidade/formula/linear_sensor.h"
 #include "alidade/state/element_names.h"
 #include "alidade/state/quaternion_sign.h"
 
@@ -29,6 +31,7 @@ namespace alidade {
 namespace {
 
 using internal::kFormula;
+using internal::kLinear;
 using internal::NamesOf;
 
 /// Calls `add`. If `add` throws, throws the error again with the place of the entry.
@@ -218,12 +221,11 @@ InputBinding ReadInput(const Node& entry, const MotionModel& model) {
 void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost& host,
                     Problem& problem) {
   const std::string model_name = entry.At("model", "a state entry").Text();
-  const bool is_formula = model_name == kFormula;
-  const SharedMotion model =
-      is_formula ? internal::CreateFormulaMotion(entry) : host.CreateMotion(model_name, entry);
+  const SharedMotion model = CreateStateModel(model_name, entry, host);
   const InputBinding input = ReadInput(entry, *model);
-  const std::vector<std::string> names =
-      is_formula ? NamesOf(model->blocks()) : ReadBlockNames(entry, *model);
+  const std::vector<std::string> names = internal::HasEquationsInConfig(model_name)
+                                             ? NamesOf(model->blocks())
+                                             : ReadBlockNames(entry, *model);
   const auto considered = ReadNames(entry, "consider", names);
   const auto constant = ReadNames(entry, "constant", names);
   for (const std::string& block : constant) {
@@ -495,13 +497,15 @@ std::optional<Node> FindBlockNode(const Node& role) {
   return role.Find("block");
 }
 
-/// Creates a sensor from the expressions in its entry. Its roles have the geometries, units and
+/// Creates a sensor from the equations in its entry. Its roles have the geometries, units and
 /// elements of the blocks to which they are bound.
-SharedSensor CreateFormula(const Node& entry, const Node& roles, const Problem& problem) {
+SharedSensor CreateFromEquations(const std::string& model, const Node& entry, const Node& roles,
+                                 const Problem& problem) {
   std::vector<Space> bound_roles;
   bool has_landmark = false;
   for (const auto& [name, node] : roles.Entries()) {
     if (name == "landmark") {
+      if (model == kLinear) node.Fail("the model linear has no landmarks", "the model formula");
       has_landmark = true;
       continue;
     }
@@ -511,7 +515,8 @@ SharedSensor CreateFormula(const Node& entry, const Node& roles, const Problem& 
     bound_roles.back().name = name;
     bound_roles.back().flags = 0;
   }
-  return internal::CreateFormulaSensor(entry, bound_roles, has_landmark);
+  return model == kLinear ? internal::CreateLinearSensor(entry, bound_roles)
+                          : internal::CreateFormulaSensor(entry, bound_roles, has_landmark);
 }
 
 /// Returns the geometry of the block that each role of `roles` is bound to. Omits roles whose block
@@ -534,8 +539,8 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
       entry.At("roles", "sensor '" + name + "'", "roles: ENTRY, or roles: {ROLE: ENTRY.BLOCK}");
   roles.ExpectMap("{ROLE: ENTRY.BLOCK}");
   const SharedSensor model =
-      model_name == kFormula
-          ? CreateFormula(entry, roles, problem)
+      internal::HasEquationsInConfig(model_name)
+          ? CreateFromEquations(model_name, entry, roles, problem)
           : host.CreateSensor(model_name, entry, {}, BoundGeometries(roles, problem));
   if (const auto loss = entry.Find("loss")) options.loss = ReadLoss(*loss);
   for (const Space& role : model->roles()) roles.Declare(role.landmark() ? "landmark" : role.name);
@@ -634,6 +639,12 @@ std::vector<double> ReadBlockValue(const Node& node, const Space& space) {
     internal::ChooseSign({}, std::span(value).subspan(static_cast<std::size_t>(quaternion), 4));
   }
   return value;
+}
+
+SharedMotion CreateStateModel(const std::string& model, const Node& entry, const PluginHost& host) {
+  if (model == kFormula) return internal::CreateFormulaMotion(entry);
+  if (model == kLinear) return internal::CreateLinearMotion(entry);
+  return host.CreateMotion(model, entry);
 }
 
 Problem ReadProblem(const Node& root, const PluginHost& host,

@@ -17,6 +17,10 @@ namespace alidade {
 Problem ReadProblem(const Node& root, const PluginHost& host,
                     const std::vector<std::string>& sensor_names);
 
+/// Creates the motion model `model` of a state entry: that of a plugin, or of the equations in the
+/// entry. Errors: kBadConfig and kPlugin.
+SharedMotion CreateStateModel(const std::string& model, const Node& entry, const PluginHost& host);
+
 /// Reads a value of the space: a number or a list of numbers. A unit quaternion is a list
 /// [w, x, y, z], a map {w: , x: , y: , z: }, or {rpy_deg: [ROLL, PITCH, YAW]}. Error: kBadConfig,
 /// also for a unit vector or unit quaternion whose length differs from 1 by more than

@@ -12,7 +12,7 @@
 #include "alidade/config/tree.h"
 #include "alidade/experiment/estimator_plugin.h"
 #include "alidade/experiment/estimator_registry.h"
-#include "alidade/formula/formula_motion.h"
+#include "alidade/experiment/read_problem.h"
 #include "alidade/formula/formula_name.h"
 
 namespace alidade {
@@ -114,10 +114,9 @@ Blocks ExpandStates(const ConfigTree& root, const PluginHost& host) {
     if (entry->kind != Node::Kind::kMap) continue;
     const ConfigTree* const model = ChildText(*entry, "model");
     if (model == nullptr) continue;
-    const bool is_formula = model->text == kFormula;
-    const SharedMotion motion = is_formula ? internal::CreateFormulaMotion(Node(entry.get()))
-                                           : host.CreateMotion(model->text, Node(entry.get()));
-    const ConfigTree* const renamed = is_formula ? nullptr : ChildMap(*entry, "blocks");
+    const SharedMotion motion = CreateStateModel(model->text, Node(entry.get()), host);
+    const bool has_equations = internal::HasEquationsInConfig(model->text);
+    const ConfigTree* const renamed = has_equations ? nullptr : ChildMap(*entry, "blocks");
     const ConfigTree* const initial = ChildMap(*entry, "initial");
     for (Space block : motion->blocks()) {
       const ConfigTree* const name = renamed == nullptr ? nullptr : ChildText(*renamed, block.name);
@@ -277,7 +276,7 @@ void ExpandSensor(ConfigTree& entry, const PluginHost& host, const Blocks& block
     offered = BlocksOf(Node(roles), blocks);
     BindEachBlock(*roles, offered);
   }
-  if (model_name->text == kFormula) return;
+  if (internal::HasEquationsInConfig(model_name->text)) return;
   // The geometries of the blocks select the variant of the model.
   const SharedSensor model =
       host.CreateSensor(model_name->text, Node(&entry), {}, BoundGeometries(*roles, blocks));

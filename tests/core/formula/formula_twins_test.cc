@@ -3,7 +3,6 @@
 // Compares formulas with the compiled models of the same equation.
 #include <gtest/gtest.h>
 
-#include <Eigen/Core>
 #include <array>
 #include <string>
 #include <vector>
@@ -28,7 +27,7 @@ using testing::Blocks;
 using testing::FormulaMotionOf;
 using testing::FormulaSensorOf;
 using testing::LargestDifference;
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using testing::ProcessNoise;
 
 constexpr double kTolerance = 1e-12;
 
@@ -51,18 +50,6 @@ void ExpectTwinSensor(const SharedSensor& sensor, const std::string& yaml, const
   EXPECT_EQ(sensor->SqrtNoise(pointers.data(), nullptr, l.data(), known), Status::kOk);
   EXPECT_EQ(twin->SqrtNoise(pointers.data(), nullptr, twin_l.data(), known), Status::kOk);
   EXPECT_LT(LargestDifference(twin_l, l), kTolerance);
-}
-
-/// Returns Q = G L L' G' as a list.
-std::vector<double> ProcessNoise(const SharedMotion& motion, const Blocks& x, const double* u,
-                                 double dt_s) {
-  const int n = motion->tangent_size(), n_w = motion->noise_size();
-  const auto step = testing::StepWithJacobians(motion, x, u, nullptr, dt_s);
-  RowMajor l(n_w, n_w);
-  EXPECT_EQ(motion->SqrtQ(testing::Pointers(x).data(), u, dt_s, l.data()), Status::kOk);
-  const RowMajor g = Eigen::Map<const RowMajor>(step.g.data(), n, n_w) * l;
-  const RowMajor q = g * g.transpose();
-  return {q.data(), q.data() + q.size()};
 }
 
 /// Expects equal f, F and Q of a motion model and of its formula.

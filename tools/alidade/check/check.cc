@@ -127,33 +127,45 @@ std::vector<CheckResult> CheckModel(const PluginEntry& entry, const Node& parame
   return CheckModel(create, options);
 }
 
-std::vector<FormulaCheck> CheckFormulas(const Config& config, const PluginHost& host,
-                                        const CheckOptions& options) {
+std::vector<ConfigModelCheck> CheckConfigModels(const Config& config, const PluginHost& host,
+                                                const std::string& model,
+                                                const CheckOptions& options) {
   constexpr unsigned kRungeKuttaOrder = 5;  // the error of a step of the Runge-Kutta method
+  const bool is_linear = model == internal::kLinear;
   Config expanded = config.Copy();
   ExpandShortForms(expanded, host);
   const Problem problem = ReadProblem(expanded.root(), host, {});
-  std::vector<FormulaCheck> checks;
-  const auto add = [&](const char* kind, const std::string& path, const auto& create) {
+  std::vector<ConfigModelCheck> checks;
+  const auto add = [&](const char* kind, const std::string& path,
+                       std::vector<CheckResult> findings) {
     PluginEntry entry;
     entry.kind = kind;
-    entry.name = internal::kFormula;
+    entry.name = model;
     entry.plugin = config.name();
-    checks.push_back({std::move(entry), path, CheckModel(create, options)});
+    checks.push_back({std::move(entry), path, std::move(findings)});
   };
   for (const MotionBinding& motion : problem.motions) {
-    if (motion.model->name() != internal::kFormula) continue;
+    if (motion.model->name() != model) continue;
     const bool is_rate = config.root().At("state").At(motion.name).Find("rate").has_value();
-    add(kMotionKind, "state." + motion.name,
-        [&] { return internal::ExportModel(motion.model, is_rate ? kRungeKuttaOrder : 0); });
+    const unsigned order = is_rate && !is_linear ? kRungeKuttaOrder : 0;
+    const auto create = [&] { return internal::ExportModel(motion.model, order); };
+    std::vector<CheckResult> findings;
+    if (is_linear && !is_rate) {
+      findings = {internal::Skip("the discrete form exists only for multiples of step.period_s")};
+      findings[0].check = "step";
+    } else {
+      findings = CheckModel(create, options);
+    }
+    add(kMotionKind, "state." + motion.name, std::move(findings));
   }
   for (const SensorBinding& sensor : problem.sensors) {
-    if (sensor.model->name() != internal::kFormula) continue;
-    add(kSensorKind, "sensors." + sensor.name, [&] { return internal::ExportModel(sensor.model); });
+    if (sensor.model->name() != model) continue;
+    const auto create = [&] { return internal::ExportModel(sensor.model); };
+    add(kSensorKind, "sensors." + sensor.name, CheckModel(create, options));
   }
   if (checks.empty()) {
-    config.root().Fail("no entry of `state` or `sensors` is a formula",
-                       "an entry with model: formula");
+    config.root().Fail("no entry of `state` or `sensors` uses the model " + model,
+                       "an entry with model: " + model);
   }
   return checks;
 }

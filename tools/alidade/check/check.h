@@ -52,16 +52,17 @@ std::vector<CheckResult> CheckModel(const PluginEntry& entry, const Node& parame
                                     const CheckOptions& options = {});
 
 /// Checks of one model whose equations are in a config.
-struct FormulaCheck {
+struct ConfigModelCheck {
   PluginEntry entry;
   std::string path;  ///< key path of the config entry, such as `sensors.range`
   std::vector<CheckResult> findings;
 };
 
-/// Checks all models `formula` of the config of a run. `host` provides the other models. Error:
-/// kBadConfig if the config is invalid, or contains no such model.
-std::vector<FormulaCheck> CheckFormulas(const Config& config, const PluginHost& host,
-                                        const CheckOptions& options = {});
+/// Checks all models `formula`, or all models `linear`, of the config of a run. `host` provides the
+/// other models. Error: kBadConfig if the config is invalid, or contains no such model.
+std::vector<ConfigModelCheck> CheckConfigModels(const Config& config, const PluginHost& host,
+                                                const std::string& model,
+                                                const CheckOptions& options = {});
 
 /// Finds sensors and motion models. `plugin` is the path of a plugin file, the name of a file on
 /// the search path, or the name of a model. The name of a file excludes `.so` and may exclude

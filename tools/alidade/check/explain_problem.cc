@@ -96,10 +96,10 @@ void AddConfigNoise(const std::string& name, const std::vector<double>& root, in
                         SigmasText(l * l.transpose()));
 }
 
-/// Adds the equations of a model if it is a formula.
+/// Adds the equations of a model if they are in the config.
 void AddEquations(const std::string& name, const std::string& model,
                   const std::vector<Space>& spaces, ExplainedTable& table) {
-  if (model != kFormula) return;
+  if (!HasEquationsInConfig(model)) return;
   for (const Space& space : spaces) {
     if (!space.doc.empty()) table.notes.push_back(name + ": " + space.doc);
   }

@@ -378,7 +378,7 @@ TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
   EXPECT_LE(ukf["rmse:target.depth"], 0.0042);
   EXPECT_GE(ukf["nees.within95:target"], 0.95);
   Settings wide = kPoorStart;
-  wide.emplace_back("estimators", "{ukf: {type: ukf, alpha: 1, kappa: 12}}");
+  wide.emplace_back("estimators", "{ukf: {type: ukf, gate: none, alpha: 1, kappa: 12}}");
   for (int seed = 1001; seed <= 1020; ++seed) {
     wide.emplace_back("source.seed", std::to_string(seed));
     const RunResult run = RunExample("08_depth_all_estimators", wide);
@@ -420,9 +420,10 @@ TEST(Examples, WhatAnEstimatorTypeDoesNotHaveIsRefusedByName) {
   const std::vector<std::pair<std::string, std::string>> unsupported = {
       {"state.template.consider", "[inverse_distance]"},
       {"state.target.initial.depth", "{from_measurement: stereo}"},
-      {"sensors.scale.roles.inverse_distance",
-       "{block: template.inverse_distance, mode: consider}"},
-      {"sensors.stereo.roles.depth", "{block: target.depth, jacobian_at: measurement}"}};
+      {"sensors.scale.roles",
+       "{depth: target.depth, inverse_distance: {block: template.inverse_distance, mode: "
+       "consider}}"},
+      {"sensors.stereo.roles", "{depth: {block: target.depth, jacobian_at: measurement}}"}};
   for (const std::string type : {"rts", "square_root_ekf", "ukf"}) {
     for (const auto& [key, value] : unsupported) {
       try {
@@ -438,8 +439,9 @@ TEST(Examples, WhatAnEstimatorTypeDoesNotHaveIsRefusedByName) {
     }
     const RunResult held = RunExample("08_depth_all_estimators",
                                       {{"estimators", "{one: {type: " + type + "}}"},
-                                       {"sensors.scale.roles.inverse_distance",
-                                        "{block: template.inverse_distance, mode: known}"}});
+                                       {"sensors.scale.roles",
+                                        "{depth: target.depth, inverse_distance: {block: "
+                                        "template.inverse_distance, mode: known}}"}});
     EXPECT_EQ(held.status, RunStatus::kOk) << type;
   }
 }

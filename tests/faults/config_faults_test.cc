@@ -188,13 +188,13 @@ const Fault kKeyFaults[] = {
     MakeFault("36_rollback_without_a_window", "depth",
               {After(kEkf, "out_of_sequence: {policy: rollback}")}, 31,
               "out_of_sequence.policy: 'policy: rollback' needs the key 'window_s'"),
-    MakeFault("50_missing_motion_model", "depth", {{"model: constant_velocity", "model: unicycle"}},
+    MakeFault("50_missing_motion_model", "depth", {{"model: constant_velocity", "model: hovercraft"}},
               4,
-              "no plugin offers the motion model 'unicycle'; expected one of constant, "
-              "constant_velocity, odometry_pose, quaternion_pose\n",
+              "no plugin offers the motion model 'hovercraft'; expected one of attitude, bicycle, "
+              "body_velocity, clock, constant, ",
               69),
     MakeFault("50_missing_source", "depth", {{kDepthSource, "{type: rosbag}"}}, 28,
-              "no plugin offers the source 'rosbag'; expected one of csv, depth_target, ", 69),
+              "no plugin offers the source 'rosbag'; expected one of depth_target, ", 69),
     MakeFault("50_missing_estimator_in_upper_case", "depth", {{kEkf, "{type: UKF}"}}, 30,
               "did you mean 'ukf'?\n", 69),
     MakeFault("50_missing_plugin", "depth", {{"stereo_disparity", "stereo_disparty"}}, 16,

@@ -88,13 +88,13 @@ TEST(SelfCalibratingFeature, IsTheCameraOfOpenCvWithTwoFocalLengths) {
 }
 
 template <class Lens>
-void ExpectTrueJacobian(const Blocks& roles) {
+void ExpectTrueLensJacobian(const Blocks& roles) {
   ExpectSame(SensorJacobian(Made<Lens>(), roles), NumericSensorJacobian(Made<Lens>(), roles), 1e-8);
 }
 TEST(SelfCalibratingFeature, HasTrueJacobians) {
-  ExpectTrueJacobian<RadialLens>(kRadial);
-  ExpectTrueJacobian<RadtanLens>({kRadial[0], kRadial[1], kRadtan, kRadial[3]});
-  ExpectTrueJacobian<OpenCvLens>({kRadial[0], kRadial[1], kOpenCv, kRadial[3]});
+  ExpectTrueLensJacobian<RadialLens>(kRadial);
+  ExpectTrueLensJacobian<RadtanLens>({kRadial[0], kRadial[1], kRadtan, kRadial[3]});
+  ExpectTrueLensJacobian<OpenCvLens>({kRadial[0], kRadial[1], kOpenCv, kRadial[3]});
 }
 
 TEST(SelfCalibratingFeature, SeesNothingBehindIt) {

@@ -489,14 +489,6 @@ RobustLoss ReadLoss(const Node& node) {
   return *loss;
 }
 
-/// Returns the node with the block of a role, or nothing if the map `role` does not contain it.
-/// ReadRole reads the other keys of the map later.
-std::optional<Node> FindBlockNode(const Node& role) {
-  if (!role.is_map()) return role;
-  for (const char* key : {"mode", "jacobian_at"}) role.Declare(key);
-  return role.Find("block");
-}
-
 /// Creates a sensor from the equations in its entry. Its roles have the geometries, units and
 /// elements of the blocks to which they are bound.
 SharedSensor CreateFromEquations(const std::string& model, const Node& entry, const Node& roles,
@@ -509,9 +501,8 @@ SharedSensor CreateFromEquations(const std::string& model, const Node& entry, co
       has_landmark = true;
       continue;
     }
-    const std::optional<Node> block = FindBlockNode(node);
-    bound_roles.push_back(
-        problem.layout[FindBlock(block ? *block : node.At("block", "a role"), problem)].space);
+    const Node block = node.is_map() ? node.At("block", "a role") : node;
+    bound_roles.push_back(problem.layout[FindBlock(block, problem)].space);
     bound_roles.back().name = name;
     bound_roles.back().flags = 0;
   }
@@ -524,11 +515,25 @@ SharedSensor CreateFromEquations(const std::string& model, const Node& entry, co
 std::map<std::string, std::string> BoundGeometries(const Node& roles, const Problem& problem) {
   std::map<std::string, std::string> geometries;
   for (const auto& [role, node] : roles.Entries()) {
-    const std::optional<Node> block = FindBlockNode(node);
+    const std::optional<Node> block = node.is_map() ? node.Find("block") : node;
     const BlockId id = block ? problem.layout.Find(block->Text()) : -1;
     if (id >= 0) geometries[role] = ToString(problem.layout[id].geometry());
   }
   return geometries;
+}
+
+/// Rejects a role that the model does not have.
+void RejectUnknownRoles(const Node& roles, const SensorModel& model) {
+  std::vector<std::string> known;
+  for (const Space& role : model.roles()) {
+    known.push_back(role.landmark() ? "landmark" : role.name);
+    if (role.landmark()) break;  // all remaining roles belong to the landmark
+  }
+  for (const auto& [name, node] : roles.Entries()) {
+    if (Contains(known, name)) continue;
+    node.Fail("unknown key", (known.size() > 1 ? "one of " : "") + internal::Join(known),
+              Nearest(name, known));
+  }
 }
 
 void ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
@@ -543,8 +548,7 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
           ? CreateFromEquations(model_name, entry, roles, problem)
           : host.CreateSensor(model_name, entry, {}, BoundGeometries(roles, problem));
   if (const auto loss = entry.Find("loss")) options.loss = ReadLoss(*loss);
-  for (const Space& role : model->roles()) roles.Declare(role.landmark() ? "landmark" : role.name);
-  roles.RejectUnread();
+  RejectUnknownRoles(roles, *model);
   OwnedStateReader owned_states(name, entry, roles, *model);
   std::vector<RoleBinding> bindings;
   for (std::size_t i = 0; i < model->roles().size(); ++i) {

@@ -253,19 +253,25 @@ class Models : public Source {
     if (settings) settings->RejectUnread();
   }
 
-  /// Returns a model of the sensor whose landmarks are points (xyz) or poses.
+  /// Returns a model of the sensor whose landmarks are points or poses.
   static SharedSensor ModelOf(const Node& entry, const SensorBinding& binding) {
     if (!binding.model->has_landmark()) return binding.model;
     entry.At("landmarks", "sensor '" + binding.name + "'");
     if (binding.xyz) return binding.xyz;
-    if (HasPose(*binding.model)) return binding.model;
-    const auto representation = RepresentationOf(binding.model->roles());
-    if (!representation || !IsXyz(*representation)) {
-      entry.Fail("model '" + binding.model->name() + "' of sensor '" + binding.name +
-                     "' has no representation xyz, which this source needs for its points",
-                 "a source with its own landmarks");
+    if (!HasPose(*binding.model) && !HasPoint(*binding.model)) {
+      entry.Fail("the landmarks of model '" + binding.model->name() + "' of sensor '" +
+                     binding.name + "' are not points, which this source draws",
+                 "a landmark role that is a vector(2) or vector(3), or a position and an "
+                 "orientation");
     }
     return binding.model;
+  }
+
+  /// Returns true if a landmark of the model is a point in the plane or in space.
+  static bool HasPoint(const SensorModel& model) {
+    const Geometry& last = model.roles().back().geometry;
+    const auto count = std::ranges::count_if(model.roles(), &Space::landmark);
+    return count == 1 && (last == Geometry::Vector(2) || last == Geometry::Vector(3));
   }
 
   /// Returns true if the landmarks of the model consist of a position and an orientation.

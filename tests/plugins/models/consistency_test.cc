@@ -98,8 +98,11 @@ class Tally : public RunObserver {
     if (frames_ < experiment_->source->size()) return;
     AddState(frame, state, sums["NEES"]);
     const std::vector<LandmarkEstimate> landmarks = named.estimator->landmarks();
-    // A landmark with zero covariance is known exactly.
-    if (landmarks.empty() || landmarks[0].covariance.isZero()) return;
+    // A landmark with zero covariance is known exactly. One in the plane has no position in space.
+    if (landmarks.empty() || landmarks[0].covariance.isZero() ||
+        !landmarks[0].covariance.allFinite()) {
+      return;
+    }
     AddLandmark(landmarks.front(), sums["NEES of the first landmark"]);
     AddLandmark(landmarks.back(), sums["NEES of the last landmark"]);
   }

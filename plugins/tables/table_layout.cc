@@ -166,6 +166,9 @@ void ReadStreamKeys(const Node& node, TableField& field) {
   if (const auto delay = node.Find("delay_s")) {
     field.delay = TimestampFromSeconds(delay->Number(0.0, 1e6, false, false, "s"));
   }
+  if (const auto interval = node.Find("min_interval_s")) {
+    field.min_interval = TimestampFromSeconds(interval->Number(0.0, 1e9, false, false, "s"));
+  }
   ReadCovariance(node, field);
   field.info.known = static_cast<int>(field.known.size());
 }

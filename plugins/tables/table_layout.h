@@ -60,6 +60,7 @@ struct TableField {
   std::optional<TableColumn> landmark, valid;
   std::vector<RowCondition> conditions;
   Timestamp delay = 0;      ///< time from the measurement to the time of its row
+  Timestamp min_interval = INT64_MIN;  ///< shortest time between rows that the stream uses
   bool goes_blind = false;  ///< true if the stream is dropped after `blind_after`
 };
 

@@ -96,6 +96,7 @@ class TablesSource : public Source {
     }
     tables_.push_back({nullptr, streams_.size(), truths_.size()});
     AddNames(layout.streams, entry, streams_);
+    last_rows_.resize(streams_.size(), kNoTimestamp);
     AddNames(layout.truths, entry, truths_);
     tables_.back().reader = std::make_unique<TableReader>(std::move(layout), ReadPath(path, folder),
                                                           path, any_order_, calibration_);
@@ -148,11 +149,13 @@ class TablesSource : public Source {
     const TableLayout& layout = reader.layout();
     for (std::size_t i = 0; i < layout.streams.size(); ++i) {
       const TableField& field = layout.streams[i];
-      if (!IsSelected(reader.row(), field)) continue;
+      Timestamp& last = last_rows_[table.first_stream + i];
+      if (!IsSelected(reader.row(), field) || !IsDue(reader.timestamp(), last, field)) continue;
       SourceFrame& frame = FrameAt(reader.timestamp() - field.delay, reader);
       Measurement measurement;
       if (!ReadMeasurement(reader.row(), field, local_frame_, measurement)) continue;
       if (field.goes_blind && reader.is_blind()) continue;
+      last = reader.timestamp();
       measurement.timestamp = frame.timestamp;
       measurement.stream = static_cast<int>(table.first_stream + i);
       frame.measurements.push_back(std::move(measurement));
@@ -163,6 +166,11 @@ class TablesSource : public Source {
       std::vector<double>& truth = FrameAt(reader.timestamp(), reader).truth[table.first_truth + i];
       if (truth.empty()) ReadValues(reader.row(), field, local_frame_, truth);
     }
+  }
+
+  /// Returns true if the stream uses a row at `timestamp`. `last` is the time of the last used row.
+  static bool IsDue(Timestamp timestamp, Timestamp last, const TableField& field) {
+    return last == kNoTimestamp || timestamp == last || timestamp - last >= field.min_interval;
   }
 
   /// Returns the pending frame at `timestamp`, to which the row of `reader` adds.
@@ -182,6 +190,7 @@ class TablesSource : public Source {
   LocalFrame local_frame_;
   TableCalibration calibration_;
   std::vector<StreamInfo> streams_, truths_;
+  std::vector<Timestamp> last_rows_;  ///< time of the last used row of each stream
   std::vector<Table> tables_;
   std::deque<PendingFrame> frames_;  ///< in the order of time
   Place place_;

@@ -169,6 +169,22 @@ TEST_F(Tables, ADelayedFrameIsCompleteWhenNoEarlierRowCanFollow) {
   close(both_ends);
 }
 
+// A stream omits rows until the interval has passed since the last row that it used. A row without
+// a value does not count, and rows with the same time belong together.
+TEST_F(Tables, AStreamMayUseRowsAtAMinimumInterval) {
+  Write("a.csv", "t_s,x,y\n0,1,\n0.1,2,20\n0.25,3,30\n0.25,4,40\n0.3,5,50\n0.6,6,60\n");
+  const std::string config =
+      "path: a.csv\ntime: {column: t_s, repeats: true}\n"
+      "streams: {x: {columns: x, min_interval_s: 0.25}, y: {columns: y, min_interval_s: 0.2}}\n";
+  const Text expected = {"0 s0=1", "100 s1=20", "250 s0=3 s0=4", "300 s1=50", "600 s0=6 s1=60"};
+  EXPECT_EQ(Shown(Frames(config)), expected);
+  any_order_ = true;
+  EXPECT_EQ(Shown(Frames(config)), expected);
+  ExpectBadConfig("path: a.csv\nstreams: {x: {columns: x, min_interval_s: -1}}\n",
+                  "run.yaml:2:43 streams.x.min_interval_s: '-1' is out of range; expected a "
+                  "number in [0, 1e+09] (s)");
+}
+
 TEST_F(Tables, AnOffsetMovesAllTimesOfATable) {
   Write("a.csv", "t,x\n1700000000000000001,1\n");
   EXPECT_EQ(Timestamps(Frames("path: a.csv\ntime: {column: t, unit: ns, offset_s: -1.7e9}\n"

@@ -21,7 +21,7 @@ using testing::Message;
 using testing::ProcessNoise;
 using Numbers = std::vector<double>;
 
-constexpr double kTolerance = 1e-12;
+constexpr double kLinearTolerance = 1e-12;
 
 /// Expects equal f, F and Q of a motion model and of its matrices.
 void ExpectTwin(const SharedMotion& motion, const std::string& yaml, const Blocks& x, double dt_s) {
@@ -29,12 +29,12 @@ void ExpectTwin(const SharedMotion& motion, const std::string& yaml, const Block
   const auto expected = testing::StepWithJacobians(motion, x, nullptr, nullptr, dt_s);
   const auto step = testing::StepWithJacobians(twin, x, nullptr, nullptr, dt_s);
   for (std::size_t i = 0; i < x.size(); ++i) {
-    EXPECT_LT(LargestDifference(step.next[i], expected.next[i]), kTolerance) << dt_s;
+    EXPECT_LT(LargestDifference(step.next[i], expected.next[i]), kLinearTolerance) << dt_s;
   }
-  EXPECT_LT(LargestDifference(step.f, expected.f), kTolerance) << dt_s;
+  EXPECT_LT(LargestDifference(step.f, expected.f), kLinearTolerance) << dt_s;
   EXPECT_LT(LargestDifference(ProcessNoise(twin, x, nullptr, dt_s),
                               ProcessNoise(motion, x, nullptr, dt_s)),
-            kTolerance)
+            kLinearTolerance)
       << dt_s;
 }
 

@@ -109,7 +109,7 @@ TEST_F(SweepCli, RefusesASourceThatCanBeReadOnce) {
   ASSERT_EQ(::mkfifo((folder_ / "table.csv").c_str(), 0600), 0);
   const Outcome pipe = Call({"sweep", "table.yaml", "--runs", "2", "-o", "out"});
   EXPECT_EQ(pipe.code, 78);
-  EXPECT_TRUE(pipe.err.starts_with("error: table.yaml:11:27 source.path: '")) << pipe.err;
+  EXPECT_TRUE(pipe.err.starts_with("error: table.yaml:11:30 source.path: '")) << pipe.err;
   EXPECT_TRUE(Contains(pipe.err, "can be read only once")) << pipe.err;
   for (const char* once : {"-", "/dev/stdin"}) {
     const Outcome sweep = Call({"sweep", "table.yaml", "--runs", "2", "--set",
@@ -318,7 +318,7 @@ TEST_F(SweepCli, RefusesSeveralRunsOverDataThatNoSeedChanges) {
   const Outcome sweep = Call(several);
   EXPECT_EQ(sweep.code, 78);
   EXPECT_TRUE(Contains(sweep.err,
-                       "source 'csv' produces the same data for every seed: all runs would be "
+                       "source 'tables' produces the same data for every seed: all runs would be "
                        "equal; "
                        "expected one run, or a source whose data depend on the seed"))
       << sweep.err;

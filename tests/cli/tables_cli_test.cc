@@ -49,12 +49,13 @@ TEST_F(TablesCli, ReadsLandmarksWithTheirIds) {
                 folder_ / "laser.yaml");
   const std::string direct = Estimates("laser.yaml", "direct");
   ASSERT_EQ(Call({"simulate", "laser.yaml", "-o", "data"}).code, 0);
-  EXPECT_EQ(Estimates("laser.yaml", "simulated",
-                      "{type: tables, path: data/posts.csv, time: {repeats: true}, streams: "
-                      "{posts: {columns: [posts.0, posts.1, posts.2, posts.3], landmark: "
-                      "landmark}}}"),
-            direct);
-  // The laser sees no post in the last frames, so measurements.csv does not contain these frames.
+  // The laser sees no post in the last frames, so neither file contains these frames.
+  const std::string simulated = Estimates(
+      "laser.yaml", "simulated",
+      "{type: tables, path: data/posts.csv, time: {repeats: true}, streams: {posts: {columns: "
+      "[posts.0, posts.1, posts.2, posts.3], landmark: landmark}}}");
+  EXPECT_GT(simulated.size(), direct.size() / 2);
+  EXPECT_TRUE(direct.starts_with(simulated));
   const std::string measured =
       Estimates("laser.yaml", "measured",
                 "{type: tables, path: direct/measurements.csv, time: {repeats: true}, streams: "

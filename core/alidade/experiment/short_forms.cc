@@ -57,7 +57,8 @@ std::set<std::string> KeysOfType(const std::string& type, const PluginHost& host
   return keys;
 }
 
-/// Moves the keys of the map `defaults` into the estimators whose types have these keys. An
+/// Moves the keys of the map `defaults` into the estimators whose types have these keys, and rejects
+/// keys that neither these types nor a built-in one has. An
 /// estimator without a type has the type of `defaults`, or else the type that its name states.
 void ExpandEstimators(ConfigTree& root, const PluginHost& host) {
   const ConfigTree* const estimators = ChildMap(root, "estimators");
@@ -78,10 +79,13 @@ void ExpandEstimators(ConfigTree& root, const PluginHost& host) {
     }
   }
   if (defaults == nullptr) return;
+  for (const auto& built_in : internal::EstimatorTypes()) {
+    known_keys.merge(KeysOfType(built_in.name, host));
+  }
   for (const auto& value : defaults->children) {
     if (known_keys.contains(value->key)) continue;
     const std::string nearest = Nearest(value->key, known_keys);
-    FailAt(KeyPlace(*value), PathOf(*value), "no estimator of this config has this key",
+    FailAt(KeyPlace(*value), PathOf(*value), "no type of estimator has this key",
            nearest.empty() ? "one of " + Join({known_keys.begin(), known_keys.end()}) : "",
            nearest);
   }

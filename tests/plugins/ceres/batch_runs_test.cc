@@ -86,16 +86,18 @@ TEST_F(CeresBatchConfig, WhatItCannotDoIsRefusedByName) {
   const auto expect = [&](const std::string& key, const std::string& value,
                           const std::string& place, const std::string& what) {
     ExpectError(ExitCode::kBadConfig,
-                {key + place + ": estimator type 'ceres_batch' does not support " + what + ';'},
+                {place + ": estimator type 'ceres_batch' does not support " + what + ';'},
                 [&] {
                   RunDepth(1, {{"estimators.batch", "{type: ceres_batch}"}, {key, value}});
                 });
   };
-  expect("sensors.scale.roles.inverse_distance", "{block: template.inverse_distance, mode: known}",
-         ".mode", "known roles");
-  expect("sensors.stereo.roles.depth", "{block: target.depth, jacobian_at: measurement}",
-         ".jacobian_at", "jacobian_at: measurement");
-  expect("state.template.consider", "[inverse_distance]", "[0]", "consider blocks");
+  expect("sensors.scale.roles",
+         "{depth: target.depth, inverse_distance: {block: template.inverse_distance, mode: known}}",
+         "sensors.scale.roles.inverse_distance.mode", "known roles");
+  expect("sensors.stereo.roles", "{depth: {block: target.depth, jacobian_at: measurement}}",
+         "sensors.stereo.roles.depth.jacobian_at", "jacobian_at: measurement");
+  expect("state.template.consider", "[inverse_distance]", "state.template.consider[0]",
+         "consider blocks");
 }
 
 TEST_F(CeresBatchConfig, KeysOfTheFiltersAreRefusedByName) {

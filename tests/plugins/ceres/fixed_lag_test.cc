@@ -359,8 +359,9 @@ TEST(FixedLag, IsRefusedWhatItCannotDo) {
     }
   };
   const std::string window = ", lag_s: 0.3";
-  expect_refused(window, "sensors.scale.roles.inverse_distance",
-                 "{block: template.inverse_distance, mode: known}",
+  expect_refused(window, "sensors.scale.roles",
+                 "{depth: target.depth, inverse_distance: {block: template.inverse_distance, mode: "
+                 "known}}",
                  "sensors.scale.roles.inverse_distance.mode: "
                  "estimator type 'fixed_lag' does not support known roles");
   expect_refused(window, "state.template.consider", "[inverse_distance]",

@@ -214,7 +214,7 @@ TEST_F(DrivenTest, FramesThatComeLateGiveTheBytesOfThoseInOrder) {
   }
 }
 
-// The fixes are in a file of their own, and each row is 0.2 s late.
+// The fixes are in a file of their own, and each row is 0.7 s late.
 TEST_F(DrivenTest, ADelayedStreamGivesTheBytesOfItsOwnTimes) {
   const std::string estimators =
       "{ekf: {type: ekf}, iekf: {type: iekf}, root: {type: square_root_ekf}, ukf: {type: ukf}, "
@@ -226,12 +226,12 @@ TEST_F(DrivenTest, ADelayedStreamGivesTheBytesOfItsOwnTimes) {
   late << "t_s,gps_m\n";
   for (const std::string& line : testing::Lines(drive)) {
     const auto cells = testing::Cells(line);
-    if (cells[0] != "t_s") late << std::stod(cells[0]) + 0.2 << ',' << cells[2] << '\n';
+    if (cells[0] != "t_s") late << std::stod(cells[0]) + 0.7 << ',' << cells[2] << '\n';
   }
   late.close();
   const std::string source = "{type: tables, path: " + folder_.path().string() +
                              ", files: [{path: fixes.csv, streams: {gps: {columns: gps_m, "
-                             "delay_s: 0.2}}}, {path: " +
+                             "delay_s: 0.7}}}, {path: " +
                              drive.string() +
                              ", streams: {odometry: speed_m_s}, truth: {position: true_m}}]}";
   for (const std::string order : {"reject", "buffer", "rollback"}) {

@@ -356,7 +356,8 @@ TEST_F(CheckTest, ShippedModelsPass) {
       {"bicycle", "{noise: {kind: discrete, speed: 0.1, steering_angle: 0.01}, wheelbase_m: 2.5}"},
       {"planar_body_velocity",
        "{noise: {linear_acceleration: [0.5, 0.1], angular_acceleration: 0.1}}"},
-      {"body_velocity", "{noise: {linear_acceleration: 0.6, angular_acceleration: [1, 2, 3]}}"},
+      {"motion model body_velocity",
+       "{noise: {linear_acceleration: 0.6, angular_acceleration: [1, 2, 3]}}"},
       {"attitude", "{noise: {gyro: 0.01}}"},
       {"inertial", "{noise: {gyro: 0.01, accelerometer: 0.1}}"},
       {"inertial",
@@ -367,6 +368,30 @@ TEST_F(CheckTest, ShippedModelsPass) {
       {"pose", "{sigma_position_m: 0.1, sigma_orientation_rad: [0.01, 0.02, 0.03]}"},
       {"relative_pose", "{sigma_position_m: 0.1, sigma_orientation_rad: [0.01, 0.02, 0.03]}"},
       {"pseudorange", "{sigma_m: 2}"},
+      {"pseudorange_rate", "{sigma_m_s: 0.1}"},
+      {"direct", "{sigma: 0.1}"},
+      {"zero", "{sigma: 0.1}"},
+      {"position", "{sigma_m: 0.1}"},
+      {"velocity", "{sigma_m_s: 0.1}"},
+      {"sensor body_velocity", "{sigma_m_s: 0.1}"},
+      {"sensor body_velocity", "{sigma_m_s: 0.1, axes: y}"},
+      {"speed", "{sigma_m_s: 0.1}"},
+      {"heading", "{sigma_rad: 0.1, declination_rad: 0.05}"},
+      {"turn_rate", "{sigma_rad_s: 0.1}"},
+      {"range", "{sigma_m: 0.1}"},
+      {"range", "{sigma_m: 0.1, point_m: [1, 2, 3]}"},
+      {"bearing", "{sigma_rad: 0.01}"},
+      {"bearing", "{sigma_rad: 0.01, measures: angles, point_m: [1, 2, 3]}"},
+      {"bearing_landmark", "{sigma_rad: 0.01}"},
+      {"tdoa", "{sigma_m: 0.1}"},
+      {"radar", "{sigma_range_m: 10, sigma_azimuth_rad: 0.01, sigma_elevation_rad: 0.01}"},
+      {"radar", "{sigma_range_m: 10, sigma_range_rate_m_s: 0.3}"},
+      {"specific_force", "{sigma_m_s2: 0.1}"},
+      {"magnetometer", "{field_ut: [20, 0, -44], sigma_ut: 1}"},
+      {"altitude", "{sigma_m: 0.3}"},
+      {"altitude", "{measures: pressure, sigma_pa: 4}"},
+      {"known_pixel",
+       "{sigma_px: 1, camera: {width: 640, height: 480, fx: 525, fy: 520, cx: 320, cy: 240}}"},
       {"range_bearing",
        "{sigma_range_m: 0.1, sigma_bearing_rad: 0.01, landmarks: {representation: inverse_depth}}"},
       {"range_bearing",
@@ -396,8 +421,11 @@ TEST_F(CheckTest, ShippedModelsPass) {
   for (const PluginEntry& entry : host_.entries()) {
     if (!entry.is_model() || entry.plugin.parent_path() != std::filesystem::canonical(shipped))
       continue;
-    const auto [first, last] = parameters.equal_range(entry.name);
-    EXPECT_NE(first, last) << "this test has no parameters for " << entry.name;
+    // A motion model and a sensor may have the same name.
+    const std::string name =
+        parameters.contains(entry.name) ? entry.name : entry.kind + ' ' + entry.name;
+    const auto [first, last] = parameters.equal_range(name);
+    EXPECT_NE(first, last) << "this test has no parameters for " << name;
     for (auto row = first; row != last; ++row, ++checked) {
       const Config config = Parse(row->second);
       EXPECT_EQ(Joined(Failures(CheckModel(entry, config.root()))), "")

@@ -161,7 +161,7 @@ TEST_F(HostTest, AMissingModelNamesWhatWasRefusedAndWhy) {
   EXPECT_EQ(host.refusals()[0].code, ExitCode::kPlugin);
   const Config config = Parse("model: probe");
   ExpectError(ExitCode::kPlugin,
-              {"refused " + (folder_ / "path/other_abi.so").string(), "built for plugin ABI 99.0"},
+              {"refused " + (folder_ / "path/other_abi.so").string(), "built for plugin ABI 99.1"},
               [&] { host.CreateSensor("probe", config.root()); });
 }
 
@@ -211,7 +211,7 @@ TEST_F(HostTest, AFileWithoutBuildTagIsRefused) {
 // Tests fault 53 of tests/faults/README.md.
 TEST_F(HostTest, AnotherAbiIsRefused) {
   ExpectRefused(Built("other_abi"),
-                {"built for plugin ABI 99.0", "this program has 1.0", "rebuild the plugin"});
+                {"built for plugin ABI 99.1", "this program has 1.1", "rebuild the plugin"});
 }
 
 TEST_F(HostTest, InstructionsThatTheProcessorLacksAreRefused) {

@@ -59,9 +59,9 @@ struct TableField {
   std::vector<TableColumn> known;  ///< columns of the known numbers of a measurement
   std::optional<TableColumn> landmark, valid;
   std::vector<RowCondition> conditions;
-  Timestamp delay = 0;      ///< time from the measurement to the time of its row
+  Timestamp delay = 0;                 ///< time from the measurement to the time of its row
   Timestamp min_interval = INT64_MIN;  ///< shortest time between rows that the stream uses
-  bool goes_blind = false;  ///< true if the stream is dropped after `blind_after`
+  bool goes_blind = false;             ///< true if the stream is dropped after `blind_after`
 };
 
 /// Times of the rows of a table.

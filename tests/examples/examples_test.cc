@@ -437,11 +437,11 @@ TEST(Examples, WhatAnEstimatorTypeDoesNotHaveIsRefusedByName) {
         EXPECT_NE(text.find("; expected "), std::string::npos) << text;
       }
     }
-    const RunResult held = RunExample("08_depth_all_estimators",
-                                      {{"estimators", "{one: {type: " + type + "}}"},
-                                       {"sensors.scale.roles",
-                                        "{depth: target.depth, inverse_distance: {block: "
-                                        "template.inverse_distance, mode: known}}"}});
+    const RunResult held =
+        RunExample("08_depth_all_estimators", {{"estimators", "{one: {type: " + type + "}}"},
+                                               {"sensors.scale.roles",
+                                                "{depth: target.depth, inverse_distance: {block: "
+                                                "template.inverse_distance, mode: known}}"}});
     EXPECT_EQ(held.status, RunStatus::kOk) << type;
   }
 }

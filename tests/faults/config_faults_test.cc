@@ -188,8 +188,8 @@ const Fault kKeyFaults[] = {
     MakeFault("36_rollback_without_a_window", "depth",
               {After(kEkf, "out_of_sequence: {policy: rollback}")}, 31,
               "out_of_sequence.policy: 'policy: rollback' needs the key 'window_s'"),
-    MakeFault("50_missing_motion_model", "depth", {{"model: constant_velocity", "model: hovercraft"}},
-              4,
+    MakeFault("50_missing_motion_model", "depth",
+              {{"model: constant_velocity", "model: hovercraft"}}, 4,
               "no plugin offers the motion model 'hovercraft'; expected one of attitude, bicycle, "
               "body_velocity, clock, constant, ",
               69),

@@ -207,6 +207,7 @@ TEST_F(RunSafety, MemoryThatRunsOutEndsRunsOfASweepNotTheProgram) {
   int failed = 0;
   for (int kib = 8'000; kib <= 60'000; kib += 250) {
     fs::remove_all(folder_ / "out");
+    fs::remove_all(folder_ / "out.partial");  // of a sweep without memory for a plugin
     before_ = "ulimit -c 0; ulimit -v " + std::to_string(kib);
     if (!Starts()) continue;
     const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "6", "--jobs", "3", "-o", "out",

@@ -284,9 +284,8 @@ TEST(ShortForms, DefaultsApplyToEachEstimatorWithTheKey) {
 }
 
 TEST(ShortForms, ErrorsOfDefaultsNameTheirPlace) {
-  EXPECT_EQ(
-      Message([&] { Estimators("estimators: [ekf]\ndefaults: {gat: 0.9}\n"); }),
-      "f.yaml:2:12 defaults.gat: no type of estimator has this key; did you mean 'gate'?");
+  EXPECT_EQ(Message([&] { Estimators("estimators: [ekf]\ndefaults: {gat: 0.9}\n"); }),
+            "f.yaml:2:12 defaults.gat: no type of estimator has this key; did you mean 'gate'?");
   Config config = Read(kSlam + "estimators: [ekf]\ndefaults: {gate: 3}\n");
   EXPECT_EQ(Message([&] { MakeFilter(config, Shipped(), "ekf"); }).substr(0, 46),
             "f.yaml:19:18 defaults.gate: '3' is out of rang");

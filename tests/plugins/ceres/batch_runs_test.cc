@@ -86,8 +86,7 @@ TEST_F(CeresBatchConfig, WhatItCannotDoIsRefusedByName) {
   const auto expect = [&](const std::string& key, const std::string& value,
                           const std::string& place, const std::string& what) {
     ExpectError(ExitCode::kBadConfig,
-                {place + ": estimator type 'ceres_batch' does not support " + what + ';'},
-                [&] {
+                {place + ": estimator type 'ceres_batch' does not support " + what + ';'}, [&] {
                   RunDepth(1, {{"estimators.batch", "{type: ceres_batch}"}, {key, value}});
                 });
   };

@@ -3,7 +3,6 @@
 
 #include "alidade/model/bound_roles.h"
 #include "alidade/model/fixed_known.h"
-#include "planar_range_bearing.h"
 
 namespace {
 

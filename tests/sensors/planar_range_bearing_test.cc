@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sensors/planar_range_bearing.h"
+#include "sensors/range_bearing.h"
 
 #include <gtest/gtest.h>
 

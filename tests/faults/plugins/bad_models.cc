@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models for tests/plugins/host/check_test.cc. Five of these models have no fault, and
-// `angles` only warns of two. Each of the
-// other models has one fault.
+// Models for tests/plugins/host/check_test.cc. Seven of these models have no fault, and the check
+// `angles` only warns of two. Each of the other models has one fault.
 #include <unistd.h>
 
 #include <cfenv>

@@ -163,6 +163,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST_F(CheckTest, EveryModelWithAFaultIsTested) {
   std::set<std::string> tested = {"right",   "may_have_bias", "landmark",      "gravity",
                                   "turning", "held",          "euler_declared"};
+  tested.insert({"unwrapped_heading", "unwrapped_bearing"});  // the check `angles` warns of them
   const auto* suite = ::testing::UnitTest::GetInstance();
   for (int i = 0; i < suite->total_test_suite_count(); ++i) {
     const auto* tests = suite->GetTestSuite(i);
@@ -178,8 +179,8 @@ TEST_F(CheckTest, EveryModelWithAFaultIsTested) {
 }
 
 TEST_F(CheckTest, ModelsWithoutFaultPass) {
-  for (const char* model :
-       {"right", "may_have_bias", "landmark", "gravity", "turning", "held", "euler_declared"}) {
+  for (const char* model : {"right", "may_have_bias", "landmark", "gravity", "turning", "held",
+                            "euler_declared", "unwrapped_heading", "unwrapped_bearing"}) {
     const auto findings = Checked(model);
     EXPECT_EQ(Joined(Failures(findings)), "") << model;
     EXPECT_FALSE(AnyFailure(findings));

@@ -57,9 +57,9 @@ std::set<std::string> KeysOfType(const std::string& type, const PluginHost& host
   return keys;
 }
 
-/// Moves the keys of the map `defaults` into the estimators whose types have these keys. Rejects keys
-/// that neither these types nor a built-in type have. An estimator without a type has the type of
-/// `defaults`, or else the type that its name states.
+/// Moves the keys of the map `defaults` into the estimators whose types have these keys. Rejects
+/// keys that neither these types nor a built-in type have. An estimator without a type has the type
+/// of `defaults`, or else the type that its name states.
 void ExpandEstimators(ConfigTree& root, const PluginHost& host) {
   const ConfigTree* const estimators = ChildMap(root, "estimators");
   if (estimators == nullptr) return;

@@ -20,6 +20,7 @@ trap 'rm -rf "$work"' EXIT
 unset ALIDADE_PLUGIN_PATH
 
 mkdir "$work/bin"
+touch "$work/scripts"
 ln -s "$PWD/core" "$PWD/examples" "$work"
 printf '#!/bin/sh\nexec "%s" "$@"\n' "$program" >"$work/bin/alidade"
 printf '#!/bin/sh\nexec "%s" "$@"\n' "$compiler" >"$work/bin/g++"
@@ -86,5 +87,5 @@ for ((n = 1; ; n++)); do
   fi
   commands=$((commands + 1))
 done
-((commands >= 3)) || { echo "error: $readme contains only $commands commands; expected at least 3" >&2; exit 1; }
+((commands >= 1)) || { echo "error: $readme contains no command" >&2; exit 1; }
 echo "readme: $commands commands print what $readme shows"

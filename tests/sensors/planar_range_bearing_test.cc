@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sensors/range_bearing.h"
-
 #include <gtest/gtest.h>
 
 #include "alidade/model/fixed_known.h"
+#include "sensors/range_bearing.h"
 #include "support/sensor_checks.h"
 
 namespace alidade {

@@ -167,9 +167,10 @@ TEST_F(Tables, AConstantIsMeasuredInEachRow) {
   ExpectBadConfig("path: a.csv\nstreams: {z: {constant: 0, columns: still}}\n",
                   "run.yaml:2:37 streams.z.columns: 'columns' and 'constant' are both given; "
                   "expected only one of these keys");
-  ExpectBadConfig("path: a.csv\nstreams: {z: {constant: 0, unit: deg}}\n",
-                  "run.yaml:2:28 streams.z.unit: unknown key; expected one of columns, constant, "
-                  "covariance, delay_s, known, landmark, rows, sigma, valid, variance");
+  ExpectBadConfig(
+      "path: a.csv\nstreams: {z: {constant: 0, unit: deg}}\n",
+      "run.yaml:2:28 streams.z.unit: unknown key; expected one of columns, constant, "
+      "covariance, delay_s, known, landmark, min_interval_s, rows, sigma, valid, variance");
 }
 
 // ---- geodetic positions -------------------------------------------------------------------------

@@ -61,12 +61,12 @@ std::string EndText(const ChildEnd& end, const internal::CallRecord& record, dou
 }
 
 /// Runs one check in a child process. Sets `ended` if the child ended without an answer.
-CheckResult RunCheck(const Check& check, const ModelCreator& create, const CheckOptions& options,
+CheckResult RunCheck(const Check& check, const ModelCreator& creator, const CheckOptions& options,
                      bool& ended) {
   internal::CallRecord record;
   const auto work = [&]() -> std::string {
     try {
-      Context context(create, options, record);
+      Context context(creator, options, record);
       const CheckResult finding = check.run(context);
       context.Close();
       return Encode(finding);
@@ -98,7 +98,7 @@ CheckResult RunCheck(const Check& check, const ModelCreator& create, const Check
 
 }  // namespace
 
-std::vector<CheckResult> CheckModel(const ModelCreator& create, const CheckOptions& options) {
+std::vector<CheckResult> CheckModel(const ModelCreator& creator, const CheckOptions& options) {
   ALIDADE_EXPECTS(options.states > 0 && options.timeout_s > 0.0);
   std::vector<CheckResult> findings;
   std::string stopped_by;
@@ -106,7 +106,7 @@ std::vector<CheckResult> CheckModel(const ModelCreator& create, const CheckOptio
     CheckResult finding = internal::Skip("'" + stopped_by + "' failed");
     if (stopped_by.empty()) {
       bool ended = false;
-      finding = RunCheck(check, create, options, ended);
+      finding = RunCheck(check, creator, options, ended);
       const bool failed = finding.verdict == CheckResult::Verdict::kFail;
       if (failed && (check.needed || ended)) stopped_by = check.name;
     }
@@ -119,12 +119,9 @@ std::vector<CheckResult> CheckModel(const ModelCreator& create, const CheckOptio
 std::vector<CheckResult> CheckModel(const PluginEntry& entry, const Node& parameters,
                                     const CheckOptions& options) {
   ALIDADE_EXPECTS(entry.is_model());
-  const auto create = [&] {
-    auto instance = CreateModel(entry, parameters);
-    if (!options.allows_unread_keys) parameters.RejectUnread();
-    return instance;
-  };
-  return CheckModel(create, options);
+  ModelCreator creator{[&] { return CreateModel(entry, parameters); }};
+  if (!options.allows_unread_keys) creator.reject_unread = [&] { parameters.RejectUnread(); };
+  return CheckModel(creator, options);
 }
 
 std::vector<ConfigModelCheck> CheckConfigModels(const Config& config, const PluginHost& host,
@@ -148,20 +145,20 @@ std::vector<ConfigModelCheck> CheckConfigModels(const Config& config, const Plug
     if (motion.model->name() != model) continue;
     const bool is_rate = config.root().At("state").At(motion.name).Find("rate").has_value();
     const unsigned order = is_rate && !is_linear ? kRungeKuttaOrder : 0;
-    const auto create = [&] { return internal::ExportModel(motion.model, order); };
+    const ModelCreator creator{[&] { return internal::ExportModel(motion.model, order); }};
     std::vector<CheckResult> findings;
     if (is_linear && !is_rate) {
       findings = {internal::Skip("the discrete form exists only for multiples of step.period_s")};
       findings[0].check = "step";
     } else {
-      findings = CheckModel(create, options);
+      findings = CheckModel(creator, options);
     }
     add(kMotionKind, "state." + motion.name, std::move(findings));
   }
   for (const SensorBinding& sensor : problem.sensors) {
     if (sensor.model->name() != model) continue;
-    const auto create = [&] { return internal::ExportModel(sensor.model); };
-    add(kSensorKind, "sensors." + sensor.name, CheckModel(create, options));
+    const ModelCreator creator{[&] { return internal::ExportModel(sensor.model); }};
+    add(kSensorKind, "sensors." + sensor.name, CheckModel(creator, options));
   }
   if (checks.empty()) {
     config.root().Fail("no entry of `state` or `sensors` uses the model " + model,

@@ -38,13 +38,17 @@ struct CheckResult {
   std::string text;   ///< description of the result; a failure includes the call and the state
 };
 
-/// Creates an instance of a checked model. Error: kBadConfig.
-using ModelCreator = std::function<std::shared_ptr<const ModelInstance>()>;
+/// Creates instances of a checked model.
+struct ModelCreator {
+  std::function<std::shared_ptr<const ModelInstance>()> create;  ///< error: kBadConfig
+  /// Throws kBadConfig if the instance did not read one of its parameters.
+  std::function<void()> reject_unread = [] {};
+};
 
-/// Checks the model that `create` returns. Each check runs in a child process with the limits of
+/// Checks the model that `creator` creates. Each check runs in a child process with the limits of
 /// `options`. The later checks are skipped if a check that they need fails, or if a child process
 /// ends without an answer. docs/check.md lists the checks.
-std::vector<CheckResult> CheckModel(const ModelCreator& create, const CheckOptions& options = {});
+std::vector<CheckResult> CheckModel(const ModelCreator& creator, const CheckOptions& options = {});
 
 /// Checks the model that `entry` creates from `parameters`. Error: kBadConfig if the parameters are
 /// invalid.

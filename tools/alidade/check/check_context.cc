@@ -25,8 +25,8 @@ bool Overflows(const CheckedState& state, const Answer& answer) {
 
 }  // namespace
 
-Context::Context(const ModelCreator& create, const CheckOptions& options, CallRecord& record)
-    : create_(create), options_(options), record_(record) {
+Context::Context(const ModelCreator& creator, const CheckOptions& options, CallRecord& record)
+    : creator_(creator), options_(options), record_(record) {
   model_ = Create();
 }
 
@@ -50,7 +50,10 @@ const std::vector<CheckedState>& Context::states() {
 
 std::unique_ptr<ModelUnderTest> Context::Create() const {
   record_.Enter("create");
-  return std::make_unique<ModelUnderTest>(create_());
+  auto instance = creator_.create();
+  record_.Enter("destroy");  // of an instance with an unread parameter
+  creator_.reject_unread();
+  return std::make_unique<ModelUnderTest>(std::move(instance));
 }
 
 void Context::Destroy(std::unique_ptr<ModelUnderTest> model) const {

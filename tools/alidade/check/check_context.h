@@ -22,7 +22,7 @@ struct CheckedState {
 /// Context of a check in the child process: the model under test and the tested states.
 class Context {
  public:
-  Context(const ModelCreator& create, const CheckOptions& options, CallRecord& record);
+  Context(const ModelCreator& creator, const CheckOptions& options, CallRecord& record);
   /// Records the destruction of the model as a call.
   ~Context() {
     if (model_) record_.Enter("destroy");
@@ -56,7 +56,7 @@ class Context {
  private:
   std::vector<Space> InputSpaces(const Function& f) const;
 
-  const ModelCreator& create_;
+  const ModelCreator& creator_;
   const CheckOptions& options_;
   CallRecord& record_;
   std::unique_ptr<ModelUnderTest> model_;

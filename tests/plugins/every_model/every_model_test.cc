@@ -74,7 +74,7 @@ TEST(Models, HaveARow) {
   }
   for (const char* folder : {"motion_models", "sensors"}) {
     for (const auto& file : fs::directory_iterator(fs::path(ALIDADE_SOURCE_DIR) / folder)) {
-      if (file.path().extension() == ".h") shipped.insert(file.path().stem().string());
+      if (file.path().extension() == ".cc") shipped.insert(file.path().stem().string());
     }
   }
   for (const PluginEntry& entry : Shipped().entries()) {

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/model/fixed_known.h"
+#include "every_model_fixture.h"
+#include "sensors/bearing.h"
+#include "sensors/bearing_landmark.h"
+#include "sensors/planar_range_bearing.h"
+
+namespace alidade::testing {
+namespace {
+
+INSTANTIATE_TEST_SUITE_P(
+    Bearings, EveryModel,
+    ::testing::Values(
+        SensorRow("bearing", "{roles: {position: vector(2)}, sigma_rad: 0.01}", Bearing(0.01),
+                  {{0.1, -0.1}, {0.5}, {0.2, 0.1}, {0.1}}),
+        SensorRow("bearing", "{roles: {position: vector(3)}, sigma_rad: 0.01}",
+                  BearingUnitVector(0.01),
+                  {kPosition, kOrientation, {0.1, 0.0, 0.05}, {0.6, 0.0, 0.8, 0.0}}),
+        SensorRow("bearing",
+                  "{roles: {position: vector(3)}, measures: angles, point_m: [8, 5, -3], "
+                  "sigma_rad: 0.01}",
+                  FixedKnown<BearingAngles>(BearingAngles(0.01), {8.0, 5.0, -3.0}),
+                  {kPosition, kOrientation, {0.1, 0.0, 0.05}, kOrientation}),
+        SensorRow("bearing_landmark", "{sigma_rad: 0.01}", BearingLandmark(0.01),
+                  {{0.1, -0.1}, {0.5}, {8.0, 5.0}}),
+        SensorRow("range_bearing",
+                  "{roles: {position: vector(2), landmark: vector(2)}, sigma_range_m: 0.1, "
+                  "sigma_bearing_rad: 0.01}",
+                  PlanarRangeBearingOfLandmark(0.1, 0.01), {{0.1, -0.1}, {0.5}, {8.0, 5.0}}),
+        SensorRow("range_bearing",
+                  "{roles: {position: vector(2)}, sigma_range_m: 0.1, sigma_bearing_rad: 0.01}",
+                  PlanarRangeBearingOfPoint(0.1, 0.01), {{0.1, -0.1}, {0.5}})),
+    RowName);
+
+}  // namespace
+}  // namespace alidade::testing

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "alidade/io/text_cell.h"
+#include "known_table.h"
 
 namespace alidade {
 namespace {
@@ -134,7 +135,9 @@ bool ReadMeasurement(const TableRow& row, const TableField& field, LocalFrame& f
                      Measurement& measurement) {
   if (!ReadValues(row, field, frame, measurement.values)) return false;
   if (AreMissing(row, field.known)) return false;
+  if (field.known_table && row.IsMissing(field.known_table->id)) return false;
   measurement.known.clear();
+  if (field.known_table) measurement.known = KnownNumbers(row, *field.known_table);
   for (const TableColumn& column : field.known) measurement.known.push_back(row.Number(column));
   measurement.landmark = -1;
   if (field.landmark && !row.IsMissing(*field.landmark)) {

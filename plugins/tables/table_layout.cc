@@ -11,20 +11,12 @@
 #include "alidade/config/unit.h"
 #include "alidade/io/text_cell.h"
 #include "data_unit.h"
+#include "known_table.h"
 
 namespace alidade {
 namespace {
 
 TableColumn ReadColumn(const Node& node) { return {node.Text(), node}; }
-
-std::vector<TableColumn> ReadColumns(const Node& node) {
-  std::vector<TableColumn> columns;
-  for (const Node& column : node.ItemsOrOne()) columns.push_back(ReadColumn(column));
-  if (columns.empty()) {
-    node.Fail("the list is empty", "the name of a column, or a list of names");
-  }
-  return columns;
-}
 
 /// Calls `set(conversion, item)` for each column of the field: with the only item of `key`, or with
 /// an item for each column.
@@ -161,7 +153,12 @@ void ReadCovariance(const Node& node, TableField& field) {
 
 /// Reads the keys that only streams have, not true values.
 void ReadStreamKeys(const Node& node, TableField& field) {
-  if (const auto known = node.Find("known")) field.known = ReadColumns(*known);
+  const std::optional<Node> known = node.Find("known");
+  if (known && known->is_map()) {
+    field.known_table = ReadKnownTableKeys(*known);
+  } else if (known) {
+    field.known = ReadColumns(*known);
+  }
   if (const auto landmark = node.Find("landmark")) field.landmark = ReadColumn(*landmark);
   if (const auto delay = node.Find("delay_s")) {
     field.delay = TimestampFromSeconds(delay->Number(0.0, 1e6, false, false, "s"));
@@ -170,7 +167,8 @@ void ReadStreamKeys(const Node& node, TableField& field) {
     field.min_interval = TimestampFromSeconds(interval->Number(0.0, 1e9, false, false, "s"));
   }
   ReadCovariance(node, field);
-  field.info.known = static_cast<int>(field.known.size());
+  const auto& columns = field.known_table ? field.known_table->columns : field.known;
+  field.info.known = static_cast<int>(columns.size());
 }
 
 void ReadFieldMap(const std::string& name, const Node& node, bool is_stream, TableField& field) {
@@ -321,6 +319,15 @@ void Resolve(const std::vector<std::string>& names, const std::string& file, Tab
 
 }  // namespace
 
+std::vector<TableColumn> ReadColumns(const Node& node) {
+  std::vector<TableColumn> columns;
+  for (const Node& column : node.ItemsOrOne()) columns.push_back(ReadColumn(column));
+  if (columns.empty()) {
+    node.Fail("the list is empty", "the name of a column, or a list of names");
+  }
+  return columns;
+}
+
 TableLayout ReadTableLayout(const Node& entry) {
   TableLayout layout{entry, {}, {}, {}, {}, '\0', {""}, {}, 1.0};
   for (const char* key : {"path", "time", "rate_hz", "max_gap_s", "on_gap", "streams", "truth",
@@ -370,6 +377,7 @@ void ResolveColumns(const std::vector<std::string>& names, const std::string& fi
       resolve(field.columns);
       if (field.covariance) resolve(field.covariance->columns);
       resolve(field.known);
+      if (field.known_table) Resolve(names, file, field.known_table->id);
       resolve_optional(field.landmark);
       resolve_optional(field.valid);
       for (RowCondition& condition : field.conditions) Resolve(names, file, condition.column);

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "alidade/base/timestamp.h"
@@ -23,6 +25,20 @@ struct TableColumn {
 struct RowCondition {
   TableColumn column;
   std::vector<std::string> texts;
+};
+
+/// Table of known numbers: a reading has those of the row with its id.
+struct KnownTable {
+  using Id = std::variant<double, std::string>;
+  struct Row {
+    int line;
+    std::vector<double> numbers;
+  };
+  Node path;                         ///< node of the config with the path
+  TableColumn id;                    ///< column of the id in the table of the readings
+  std::vector<TableColumn> columns;  ///< columns of the known numbers
+  std::string file;
+  std::map<Id, Row> rows;
 };
 
 /// Columns with the covariance R of each measurement.
@@ -56,7 +72,8 @@ struct TableField {
   /// converted to east, north and up.
   bool geodetic = false;
   std::optional<CovarianceColumns> covariance;
-  std::vector<TableColumn> known;  ///< columns of the known numbers of a measurement
+  std::vector<TableColumn> known;         ///< columns of the known numbers of a measurement
+  std::optional<KnownTable> known_table;  ///< replaces `known`
   std::optional<TableColumn> landmark, valid;
   std::vector<RowCondition> conditions;
   Timestamp delay = 0;                 ///< time from the measurement to the time of its row
@@ -86,6 +103,9 @@ struct TableLayout {
   std::optional<Node> blind_after_node;
   double blind_after = 1.0;
 };
+
+/// Reads the name of a column or a list of names. Errors: kBadConfig.
+std::vector<TableColumn> ReadColumns(const Node& node);
 
 /// Reads all keys of kTableKeys except `path`. Errors: kBadConfig.
 TableLayout ReadTableLayout(const Node& entry);

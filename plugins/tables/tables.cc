@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "field_values.h"
+#include "known_table.h"
 #include "local_frame.h"
 #include "table_calibration.h"
 #include "table_layout.h"
@@ -87,6 +88,9 @@ class TablesSource : public Source {
 
   void AddTable(const Node& entry, const std::filesystem::path& folder) {
     TableLayout layout = ReadTableLayout(entry);
+    for (TableField& stream : layout.streams) {
+      if (stream.known_table) ReadKnownTable(folder, *stream.known_table);
+    }
     const Node path = entry.At("path", "tables");
     const auto is_standard_input = [](const Table& table) {
       return table.reader->name() == "<stdin>";

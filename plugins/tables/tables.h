@@ -23,7 +23,10 @@ inline constexpr const char* kTableKeys =
     "streams        {STREAM: x}, {STREAM: [x, y]}, or {STREAM: {columns: [x, y], unit: deg, gain: "
     "1, offset: 0, reciprocal: false, geodetic: false, constant: 0, sigma: s, variance: v, "
     "covariance: [..], landmark: id, known: [a, b], rows: {column: value}, valid: flag, delay_s: "
-    "0, min_interval_s: 0}}; every key but columns is optional, and constant replaces columns\n"
+    "0, min_interval_s: 0}}; every key but columns is optional, and constant replaces columns; "
+    "known: {path: beacons.csv, id: beacon, columns: [a, b]} reads the row of a table with the same "
+    "id
+"
     "truth          true values, in the form of streams; optional\n"
     "columns        names of the columns of a table without header\n"
     "separator      character between cells, or ' ' for any blanks; default: that of the table\n"

@@ -124,7 +124,11 @@ CompiledFunction::CompiledFunction(std::vector<Geometry> inputs, const Node& own
 
 void CompiledFunction::AddOutput(const Geometry& geometry, const Value& value, const Node& owner) {
   outputs_.push_back(geometry);
-  for (const int node : value.nodes) sweeps_.push_back(program_.SweepFrom(node));
+  for (const int node : value.nodes) {
+    sweeps_.push_back(program_.SweepFrom(node));
+    const auto constant = program_.ConstantValue(node);
+    if (constant && geometry.is_vector()) constants_.push_back(*constant);
+  }
   ExpectAtMost(static_cast<int>(sweeps_.size()), "results", owner);
   if (program_.size() <= Program::kMaxNodes) return;
   owner.Fail("the formula has too many operations",
@@ -155,6 +159,11 @@ bool CompiledFunction::EvaluateAmbient(const double* x, double* y, double* jacob
 
 Status CompiledFunction::Evaluate(const double* const* x, double* y, double* const* jacobians,
                                   const int* strides) const {
+  const bool is_constant = constants_.size() == sweeps_.size() && conditions_.empty();
+  if (is_constant && jacobians == nullptr) {
+    std::ranges::copy(constants_, y);
+    return Status::kOk;
+  }
   double variables[kMaxElements], results[kMaxElements], ambient[kMaxElements * kMaxElements];
   for (std::size_t k = 0; k < inputs_.size(); ++k) {
     std::copy_n(x[k], inputs_[k].ambient, variables + offsets_[k]);

@@ -56,6 +56,7 @@ class CompiledFunction {
   std::vector<int> offsets_;
   Program program_;
   std::vector<Program::Sweep> sweeps_;  ///< one for each element of the outputs
+  std::vector<double> constants_;       ///< elements of vectors that do not depend on the inputs
   std::vector<Condition> conditions_;
 };
 

@@ -206,39 +206,58 @@ Program::Sweep Program::SweepFrom(int node) const {
 }
 
 bool Program::Evaluate(const double* x, bool with_slopes, Tape& tape) const {
-  std::copy_n(x, variables_, tape.value);
-  const int count = size();
+  for (int i = 0; i < variables_; ++i) tape.value[i] = x[i];
   double undefined = 0.0;  // NaN as soon as a value is not finite
-  for (int i = variables_; i < count; ++i) {
-    const Node& node = nodes_[static_cast<std::size_t>(i)];
-    if (node.op == Op::kConstant) {
-      tape.value[i] = node.value;
+  int i = variables_;
+  for (const Node* node = nodes_.data() + variables_; i < size(); ++i, ++node) {
+    if (node->op == Op::kConstant) {
+      tape.value[i] = node->value;
       continue;
     }
-    Result result;
-    const double second = node.y < 0 ? 0.0 : tape.value[node.y];
-    if (!Compute(node.op, tape.value[node.x], second, result)) return false;
-    undefined += 0.0 * result.value;
-    tape.value[i] = result.value;
+    const double a = tape.value[node->x], b = node->y < 0 ? 0.0 : tape.value[node->y];
+    double value = 0.0, slope_a = 1.0, slope_b = 1.0;
+    switch (node->op) {
+      case Op::kAdd:
+        value = a + b;
+        break;
+      case Op::kSubtract:
+        value = a - b;
+        slope_b = -1.0;
+        break;
+      case Op::kMultiply:
+        value = a * b;
+        slope_a = b;
+        slope_b = a;
+        break;
+      default: {
+        Result result;
+        if (!Compute(node->op, a, b, result)) return false;
+        value = result.value;
+        slope_a = result.x;
+        slope_b = result.y;
+      }
+    }
+    undefined += 0.0 * value;
+    tape.value[i] = value;
     if (!with_slopes) continue;
-    tape.slope[i][0] = result.x;
-    tape.slope[i][1] = result.y;
+    tape.slope[i][0] = slope_a;
+    tape.slope[i][1] = slope_b;
   }
   return undefined == 0.0;
 }
 
 void Program::Gradient(const Sweep& sweep, Tape& tape, double* gradient) const {
-  std::fill_n(tape.adjoint, variables_, 0.0);
+  for (int i = 0; i < variables_; ++i) tape.adjoint[i] = 0.0;
   for (const int i : sweep) tape.adjoint[i] = 0.0;
   tape.adjoint[sweep.front()] = 1.0;
   for (const int i : sweep) {
     const Node& node = nodes_[static_cast<std::size_t>(i)];
-    if (node.x < 0) continue;
+    if (node.x < 0) continue;  // a variable or a constant
     const double adjoint = tape.adjoint[i];
     tape.adjoint[node.x] += adjoint * tape.slope[i][0];
     if (node.y >= 0) tape.adjoint[node.y] += adjoint * tape.slope[i][1];
   }
-  std::copy_n(tape.adjoint, variables_, gradient);
+  for (int i = 0; i < variables_; ++i) gradient[i] = tape.adjoint[i];
 }
 
 int Program::Append(const Node& node) {

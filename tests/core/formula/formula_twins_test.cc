@@ -10,10 +10,13 @@
 #include "alidade/estimation/direct_models.h"
 #include "alidade/testing/jacobians.h"
 #include "motion_models/constant.h"
+#include "motion_models/constant_acceleration.h"
 #include "motion_models/constant_velocity.h"
 #include "motion_models/quaternion_pose.h"
+#include "motion_models/unicycle.h"
 #include "sensors/pose.h"
 #include "sensors/pseudorange.h"
+#include "sensors/radar.h"
 #include "sensors/range_bearing.h"
 #include "sensors/relative_pose.h"
 #include "sensors/scale_2d.h"
@@ -132,6 +135,39 @@ TEST(FormulaTwins, ConstantVelocityWithDiscreteNoise) {
                    "blocks: {position: number, velocity: number}\n"
                    "noise: {kind: discrete, a: 0.7}\nrate: {position: velocity, velocity: a}\n",
                    {{1}, {3}}, 0.4);
+}
+
+TEST(FormulaTwins, ConstantAcceleration) {
+  ExpectTwinMotion(MakeMotion(ConstantAcceleration<2, true>(0.7)),
+                   "blocks: {p: [x, y], v: [x, y], a: [x, y]}\nnoise: {jx: 0.7, jy: 0.7}\n"
+                   "rate: {p: v, v: a, a: '[jx, jy]'}\n",
+                   {{1, 2}, {3, -4}, {5, 6}}, 0.4);
+}
+
+TEST(FormulaTwins, Unicycle) {
+  const std::array u = {1.5, 0.7};
+  ExpectTwinMotion(MakeMotion(Unicycle(NoiseKind::kContinuous, 0.1, 0.05)), R"yaml(
+blocks: {p: [x, y], heading: angle}
+inputs: {u: [v, omega]}
+noise: {nv: 0.1, nw: 0.05}
+let: {s: (u.v + nv) * dt, phi: (u.omega + nw) * dt, middle: heading + 0.5 * phi}
+step:
+  p: p + s * sinc(0.5 * phi) * [cos(middle), sin(middle)]
+  heading: heading + phi
+)yaml",
+                   {{1, 2}, {3.1}}, 0.4, u.data());
+}
+
+TEST(FormulaTwins, Radar) {
+  ExpectTwinSensor(MakeSensor(Radar<2, true, true, true>({5, 0.01, 0.3})), R"yaml(
+let: {h: position - radar_position, d: norm(h)}
+z:
+  range: d
+  azimuth: atan2(h.y, h.x)
+  range_rate: dot(h, velocity - radar_velocity) / d
+sigma: {range: 5, azimuth: 0.01, range_rate: 0.3}
+)yaml",
+                   {{300, 200}, {-10, 5}, {1, -2}, {0.5, 0.2}});
 }
 
 TEST(FormulaTwins, QuaternionPose) {

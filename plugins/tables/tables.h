@@ -24,9 +24,9 @@ inline constexpr const char* kTableKeys =
     "1, offset: 0, reciprocal: false, geodetic: false, constant: 0, sigma: s, variance: v, "
     "covariance: [..], landmark: id, known: [a, b], rows: {column: value}, valid: flag, delay_s: "
     "0, min_interval_s: 0}}; every key but columns is optional, and constant replaces columns; "
-    "known: {path: beacons.csv, id: beacon, columns: [a, b]} reads the row of a table with the same "
-    "id
-"
+    "known: {path: beacons.csv, id: beacon, columns: [a, b]} reads the row of a table with the "
+    "same "
+    "id\n"
     "truth          true values, in the form of streams; optional\n"
     "columns        names of the columns of a table without header\n"
     "separator      character between cells, or ' ' for any blanks; default: that of the table\n"

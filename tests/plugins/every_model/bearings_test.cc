@@ -3,7 +3,7 @@
 #include "every_model_fixture.h"
 #include "sensors/bearing.h"
 #include "sensors/bearing_landmark.h"
-#include "sensors/planar_range_bearing.h"
+#include "sensors/range_bearing.h"
 
 namespace alidade::testing {
 namespace {

@@ -4,9 +4,8 @@
 #include "alidade/model/bound_roles.h"
 #include "alidade/model/plugin.h"
 
+namespace alidade {
 namespace {
-
-using namespace alidade;
 
 template <int H>
 void Emplace(bool is_pressure, Params& p, AlidadeInstance* instance) {
@@ -28,6 +27,7 @@ void Make(Params& p, AlidadeInstance* instance) {
 }
 
 }  // namespace
+}  // namespace alidade
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "altitude", "height of a body, or pressure at this height",
-                                 "[Icao1993]"))
+ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(alidade::Make, "altitude",
+                                 "height of a body, or pressure at this height", "[Icao1993]"))

@@ -4,9 +4,8 @@
 #include "alidade/model/bound_roles.h"
 #include "alidade/model/fixed_known.h"
 
+namespace alidade {
 namespace {
-
-using namespace alidade;
 
 void Make(Params& p, AlidadeInstance* instance) {
   BoundRoles(p).VisitSize<2, 3>("position", [&](auto size) {
@@ -22,6 +21,7 @@ void Make(Params& p, AlidadeInstance* instance) {
 }
 
 }  // namespace
+}  // namespace alidade
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "bearing", "direction from a body to a known point",
+ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(alidade::Make, "bearing", "direction from a body to a known point",
                                  "[Thrun2005] sec. 6.6"))

@@ -6,9 +6,8 @@
 #include "alidade/model/bound_roles.h"
 #include "alidade/model/plugin.h"
 
+namespace alidade {
 namespace {
-
-using namespace alidade;
 
 template <int D, int M>
 void Emplace(const std::string& letters, Params& p, AlidadeInstance* instance) {
@@ -46,7 +45,8 @@ void Make(Params& p, AlidadeInstance* instance) {
 }
 
 }  // namespace
+}  // namespace alidade
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "body_velocity",
+ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(alidade::Make, "body_velocity",
                                  "velocity of a point on a body, in the frame of the sensor",
                                  "[Groves2013] sec. 6.4, 15.4.1"))

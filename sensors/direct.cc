@@ -4,9 +4,8 @@
 #include "alidade/model/bound_roles.h"
 #include "alidade/model/plugin.h"
 
+namespace alidade {
 namespace {
-
-using namespace alidade;
 
 void Make(Params& p, AlidadeInstance* instance) {
   const BoundRoles roles(p);
@@ -27,6 +26,7 @@ void Make(Params& p, AlidadeInstance* instance) {
 }
 
 }  // namespace
+}  // namespace alidade
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "direct", "measured value of a block of any geometry",
-                                 "[Sola2017] ch. 4"))
+ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(alidade::Make, "direct",
+                                 "measured value of a block of any geometry", "[Sola2017] ch. 4"))

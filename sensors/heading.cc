@@ -4,9 +4,8 @@
 #include "alidade/model/bound_roles.h"
 #include "alidade/model/plugin.h"
 
+namespace alidade {
 namespace {
-
-using namespace alidade;
 
 void Make(Params& p, AlidadeInstance* instance) {
   if (BoundRoles(p).Find("orientation") != nullptr) {
@@ -17,6 +16,8 @@ void Make(Params& p, AlidadeInstance* instance) {
 }
 
 }  // namespace
+}  // namespace alidade
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "heading", "heading of a body, such as that of a compass",
+ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(alidade::Make, "heading",
+                                 "heading of a body, such as that of a compass",
                                  "[Groves2013] sec. 6.1.1"))

@@ -6,9 +6,8 @@
 #include "alidade/model/bound_roles.h"
 #include "alidade/model/plugin.h"
 
+namespace alidade {
 namespace {
-
-using namespace alidade;
 
 /// Standard deviations of the measured quantities.
 struct Sigmas {
@@ -73,6 +72,8 @@ void Make(Params& p, AlidadeInstance* instance) {
 }
 
 }  // namespace
+}  // namespace alidade
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "radar", "range, direction and range rate of a target",
+ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(alidade::Make, "radar",
+                                 "range, direction and range rate of a target",
                                  "[BarShalom2001] sec. 10.4"))

@@ -4,9 +4,8 @@
 #include "alidade/model/bound_roles.h"
 #include "alidade/model/fixed_known.h"
 
+namespace alidade {
 namespace {
-
-using namespace alidade;
 
 void Make(Params& p, AlidadeInstance* instance) {
   const BoundRoles roles(p);
@@ -23,7 +22,8 @@ void Make(Params& p, AlidadeInstance* instance) {
 }
 
 }  // namespace
+}  // namespace alidade
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "range_bearing",
+ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(alidade::Make, "range_bearing",
                                  "range and bearing of a landmark, in the plane also of a point",
                                  "[Thrun2005] sec. 6.6"))

@@ -4,9 +4,8 @@
 #include "alidade/model/bound_roles.h"
 #include "alidade/model/plugin.h"
 
+namespace alidade {
 namespace {
-
-using namespace alidade;
 
 void Make(Params& p, AlidadeInstance* instance) {
   if (BoundRoles(p).Find("angular_velocity") != nullptr) {
@@ -17,7 +16,8 @@ void Make(Params& p, AlidadeInstance* instance) {
 }
 
 }  // namespace
+}  // namespace alidade
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "turn_rate",
+ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(alidade::Make, "turn_rate",
                                  "turn rate or angular velocity, measured by a gyroscope",
                                  "[Groves2013] sec. 4.4"))

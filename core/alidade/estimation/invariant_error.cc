@@ -128,7 +128,8 @@ class InvariantMotion final : public MotionModel {
         if (members_[i] < 0) {
           remaining.push_back(row);
         } else {
-          order_[static_cast<std::size_t>(group_.Row(members_[i]) + k)] = row;
+          order_[static_cast<std::size_t>(group_.Row(members_[i])) + static_cast<std::size_t>(k)] =
+              row;
         }
       }
     }

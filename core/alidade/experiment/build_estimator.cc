@@ -295,6 +295,18 @@ void CheckCanRollBack(const EstimatorSpec& spec, const Node& entry) {
                         "another type of estimator, or 'out_of_sequence.policy: buffer'");
 }
 
+/// Reads `on_plugin_failure`, whose value `disable` excludes a rollback.
+OnPluginFailure ReadPluginFailure(const Node& policy, const Node& root) {
+  const auto choice = static_cast<OnPluginFailure>(policy.Choice({"skip", "disable", "abort"}));
+  const auto order = root.Find("out_of_sequence");
+  const auto rollback = order ? order->Find("policy") : std::nullopt;
+  if (choice == OnPluginFailure::kDisable && rollback && rollback->Text() == "rollback") {
+    policy.Fail("a rollback would use the disabled sensor again for earlier frames",
+                "skip or abort, or another out_of_sequence.policy");
+  }
+  return choice;
+}
+
 }  // namespace
 
 EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const Config& config,
@@ -319,15 +331,7 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
     spec.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
   }
   if (const auto policy = entry.Find("on_plugin_failure")) {
-    spec.on_plugin_failure =
-        static_cast<OnPluginFailure>(policy->Choice({"skip", "disable", "abort"}));
-    const auto order = config.root().Find("out_of_sequence");
-    const auto rollback = order ? order->Find("policy") : std::nullopt;
-    if (spec.on_plugin_failure == OnPluginFailure::kDisable && rollback &&
-        rollback->Text() == "rollback") {
-      policy->Fail("a rollback would use the disabled sensor again for earlier frames",
-                   "skip or abort, or another out_of_sequence.policy");
-    }
+    spec.on_plugin_failure = ReadPluginFailure(*policy, config.root());
   }
   const auto overrides = entry.Find("overrides");
   Config merged = overrides ? config.Merged(*overrides) : config;

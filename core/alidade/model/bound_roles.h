@@ -22,9 +22,9 @@ class BoundRoles {
 
     /// Returns the number of elements of a vector, or 0.
     int VectorSize() const {
-      const char kPrefix[] = "vector(";
-      return geometry.compare(0, sizeof(kPrefix) - 1, kPrefix) == 0
-                 ? std::atoi(geometry.c_str() + sizeof(kPrefix) - 1)
+      const char prefix[] = "vector(";
+      return geometry.compare(0, sizeof(prefix) - 1, prefix) == 0
+                 ? std::atoi(geometry.c_str() + sizeof(prefix) - 1)
                  : 0;
     }
   };

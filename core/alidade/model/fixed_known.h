@@ -45,13 +45,13 @@ struct FixedKnown<Model, false> : Model {
   /// Calls the function of Model with the fixed numbers.
   template <class... A, std::enable_if_t<sizeof...(A) == kArguments, int> = 0>
   bool Predict(A... roles_and_z) const {
-    return Insert([this](auto... a) { return Model::Predict(a...); },
+    return Insert([this](auto... a) { return this->Model::Predict(a...); },
                   std::make_tuple(roles_and_z...), std::make_index_sequence<kArguments - 1>());
   }
   /// Calls the function of Model with the fixed numbers.
   template <class... A, std::enable_if_t<sizeof...(A) == kArguments, int> = 0>
   void SqrtNoise(A... roles_and_l) const {
-    Insert([this](auto... a) { Model::SqrtNoise(a...); }, std::make_tuple(roles_and_l...),
+    Insert([this](auto... a) { this->Model::SqrtNoise(a...); }, std::make_tuple(roles_and_l...),
            std::make_index_sequence<kArguments - 1>());
   }
 

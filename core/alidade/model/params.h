@@ -124,7 +124,8 @@ class Params {
     std::array<double, N> result;
     result.fill(count >= 1 ? values[0] : StandIn(range));
     if (count == N) std::copy_n(values, N, result.begin());
-    if (count > 1 && count != N) Fail(key, "needs one number, or one number for each axis");
+    const bool is_list = count > 1;
+    if (is_list && count != N) Fail(key, "needs one number, or one number for each axis");
     return result;
   }
   /// Reports an error of the parameters, for example if two parameters contradict each other.

@@ -70,7 +70,8 @@ std::int32_t Initialise(const void* self, const AlidadeObservation* seen,
   const InverseModel& inverse = sensor.inverse();
   int n = 0;
   for (int i = 0; i < inverse.count; ++i)
-    n += sensor.roles()[static_cast<std::size_t>(inverse.role + i)].geometry.tangent;
+    n += sensor.roles()[static_cast<std::size_t>(inverse.role) + static_cast<std::size_t>(i)]
+             .geometry.tangent;
   const int m = sensor.measurement().geometry.tangent;
   std::vector<double> dense_z = Matrix(n, m), dense_p = Matrix(n, inverse.prior_size);
   const Status status =

@@ -351,14 +351,11 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
   entry.RejectUnread();
   spec.problem = ReadProblem(merged.root(), host, sensor_names);
   RefuseUnsupported(spec.type, capabilities, merged.root(), spec.problem);
-  if (of_core != nullptr) {
-    RefuseSingleMatches(entry, spec.problem);
-  }
+  if (of_core != nullptr) RefuseSingleMatches(entry, spec.problem);
   if (streams != nullptr) CheckStreams(merged.root(), spec.problem, *streams);
   // This estimator must initialise each landmark at the same frame as the estimator whose accepted
   // measurements it uses.
-  const bool uses_accepted = use && use->is_map();
-  if (uses_accepted && spec.problem.landmarks) {
+  if (use && use->is_map() && spec.problem.landmarks) {
     LandmarkOptions& landmarks = *spec.problem.landmarks;
     landmarks.min_observations = 1;
     if (landmarks.prior) landmarks.prior->min_observations = 0;

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# tests/examples/readme_test.sh PROGRAM COMPILER [README]
+# tests/examples/readme_test.sh PROGRAM COMPILER [README [COMMANDS]]
 #
 # Runs the code blocks of README.md in a temporary folder. A block below `<!-- test: FILE -->` is
 # written to FILE. In a block below `<!-- test: output -->` each line that begins with `$ ` is run
@@ -9,12 +9,13 @@
 # command must contain the lines below the command in this order; other lines may come between them.
 # Numbers may differ by 1 %: the seed is fixed, but the last digits depend on the compiler. A block
 # marked `output batch` is skipped in a build without the batch estimators. Each scripts/NAME in a
-# block of the language sh must exist.
+# block of the language sh must exist. README must contain at least COMMANDS commands (default: 3).
 set -euo pipefail
 program=$(realpath "$1")
 compiler=$(command -v "$2")
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 readme=${3:-README.md}
+least=${4:-3}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 unset ALIDADE_PLUGIN_PATH
@@ -87,5 +88,5 @@ for ((n = 1; ; n++)); do
   fi
   commands=$((commands + 1))
 done
-((commands >= 1)) || { echo "error: $readme contains no command" >&2; exit 1; }
+((commands >= least)) || { echo "error: $readme contains only $commands commands; expected at least $least" >&2; exit 1; }
 echo "readme: $commands commands print what $readme shows"

@@ -15,7 +15,7 @@
 
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/experiment/verdict.h"
+#include "alidade/diagnosis/verdict.h"
 #include "alidade/io/output_file.h"
 #include "alidade/io/utf8.h"
 #include "alidade/io/wrap_text.h"

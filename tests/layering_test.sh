@@ -41,7 +41,7 @@ if [[ ${1:-} == --self-test ]]; then
   self_test=true
   shift
 fi
-rooms="model base state estimation testing io config plugin formula experiment report evaluate bundle check replay record sweep compare"
+rooms="model base state estimation testing io config plugin formula diagnosis experiment report evaluate bundle check replay record sweep compare"
 root=$(cd "${1:-$(dirname "${BASH_SOURCE[0]}")/..}" && pwd)
 folders=(core tools motion_models sensors plugins cli bench tests examples)
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/diagnosis/measurement_log.h"
 #include "alidade/estimation/rollback.h"
-#include "alidade/experiment/measurement_log.h"
 #include "alidade/experiment/metrics.h"
 #include "alidade/experiment/reference_metrics.h"
 #include "alidade/experiment/run.h"

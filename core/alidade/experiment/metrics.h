@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/diagnosis/verdict.h"
 #include "alidade/experiment/run.h"
-#include "alidade/experiment/verdict.h"
 
 namespace alidade {
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/diagnosis/verdict.h"
 #include "alidade/experiment/experiment.h"
-#include "alidade/experiment/verdict.h"
 #include "alidade/io/wrap_text.h"
 
 namespace alidade {

@@ -6,9 +6,9 @@
 #include <sstream>
 #include <string>
 
+#include "alidade/diagnosis/verdict.h"
 #include "alidade/estimation/event.h"
 #include "alidade/experiment/metric_table.h"
-#include "alidade/experiment/verdict.h"
 #include "alidade/record/column_tables.h"
 
 /// The lists of metrics, events, outcomes and columns in the documentation are generated from

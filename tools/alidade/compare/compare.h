@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "alidade/compare/over_seeds.h"
+#include "alidade/diagnosis/verdict.h"
 #include "alidade/experiment/run.h"
-#include "alidade/experiment/verdict.h"
 #include "alidade/sweep/sweep.h"
 
 /// Comparison of estimators over the same data, and decomposition of the differences between them

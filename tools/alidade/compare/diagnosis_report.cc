@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "alidade/base/number_text.h"
-#include "alidade/experiment/diagnosis.h"
+#include "alidade/diagnosis/diagnosis.h"
 #include "alidade/record/run_json.h"
 
 namespace alidade {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/experiment/innovation_series.h"
+#include "alidade/diagnosis/innovation_series.h"
 
 namespace alidade {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/experiment/verdict.h"
+#include "alidade/diagnosis/verdict.h"
 
 #include <gtest/gtest.h>
 

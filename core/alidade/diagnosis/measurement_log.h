@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "alidade/base/timestamp.h"
+#include "alidade/diagnosis/innovation_series.h"
 #include "alidade/estimation/estimator.h"
-#include "alidade/experiment/innovation_series.h"
 
 namespace alidade {
 

@@ -9,7 +9,7 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/statistics.h"
-#include "alidade/experiment/diagnosis_rules.h"
+#include "alidade/diagnosis/diagnosis_rules.h"
 
 namespace alidade::internal {
 namespace {

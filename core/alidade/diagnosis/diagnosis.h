@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "alidade/base/enum_table.h"
-#include "alidade/experiment/innovation_series.h"
+#include "alidade/diagnosis/innovation_series.h"
 
 namespace alidade {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/experiment/measurement_log.h"
+#include "alidade/diagnosis/measurement_log.h"
 
 #include <algorithm>
 

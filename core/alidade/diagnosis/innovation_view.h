@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "alidade/experiment/innovation_series.h"
+#include "alidade/diagnosis/innovation_series.h"
 #include "alidade/model/geometry.h"
 
 /// Statistics that the rules of Diagnose share. The measurements of a frame, which have the same

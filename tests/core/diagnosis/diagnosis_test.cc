@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/experiment/diagnosis.h"
+#include "alidade/diagnosis/diagnosis.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "alidade/base/statistics.h"
-#include "alidade/experiment/diagnosis_rules.h"
+#include "alidade/diagnosis/diagnosis_rules.h"
 
 namespace alidade {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/experiment/time_series.h"
+#include "alidade/diagnosis/time_series.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/experiment/diagnosis.h"
+#include "alidade/diagnosis/diagnosis.h"
 
 #include <algorithm>
 #include <optional>
 #include <utility>
 
-#include "alidade/experiment/diagnosis_rules.h"
+#include "alidade/diagnosis/diagnosis_rules.h"
 
 namespace alidade {
 namespace {

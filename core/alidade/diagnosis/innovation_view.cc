@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/experiment/innovation_view.h"
+#include "alidade/diagnosis/innovation_view.h"
 
 #include <algorithm>
 #include <cmath>

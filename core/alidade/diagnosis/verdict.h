@@ -12,9 +12,9 @@
 
 #include "alidade/base/enum_table.h"
 #include "alidade/base/timestamp.h"
+#include "alidade/diagnosis/diagnosis.h"
+#include "alidade/diagnosis/measurement_log.h"
 #include "alidade/estimation/event.h"
-#include "alidade/experiment/diagnosis.h"
-#include "alidade/experiment/measurement_log.h"
 
 namespace alidade {
 

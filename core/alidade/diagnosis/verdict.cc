@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/experiment/verdict.h"
+#include "alidade/diagnosis/verdict.h"
 
 #include <algorithm>
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/statistics.h"
+#include "alidade/diagnosis/time_series.h"
 #include "alidade/estimation/recovery.h"
-#include "alidade/experiment/time_series.h"
 
 namespace alidade {
 namespace {

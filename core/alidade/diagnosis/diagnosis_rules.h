@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "alidade/experiment/diagnosis.h"
-#include "alidade/experiment/innovation_view.h"
+#include "alidade/diagnosis/diagnosis.h"
+#include "alidade/diagnosis/innovation_view.h"
 
 /// Rules of Diagnose. Each rule tests the innovations of one sensor, and returns its finding or
 /// nullopt. diagnosis.cc lists the rules.

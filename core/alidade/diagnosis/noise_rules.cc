@@ -8,8 +8,8 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/statistics.h"
-#include "alidade/experiment/diagnosis_rules.h"
-#include "alidade/experiment/time_series.h"
+#include "alidade/diagnosis/diagnosis_rules.h"
+#include "alidade/diagnosis/time_series.h"
 
 namespace alidade::internal {
 namespace {

@@ -132,10 +132,9 @@ Blocks ExpandStates(const ConfigTree& root, const PluginHost& host) {
   return blocks;
 }
 
-/// Returns whether the geometry of the block is that of the role, and the units do not differ.
-bool Fits(const Space& block, const Space& role) {
-  return block.geometry == role.geometry &&
-         (block.unit.empty() || role.unit.empty() || block.unit == role.unit);
+/// Returns whether the units do not differ. A unit that is not declared is not compared.
+bool HasUnitOf(const Space& block, const Space& role) {
+  return block.unit.empty() || role.unit.empty() || block.unit == role.unit;
 }
 
 /// Block of a state entry, with its name in the form ENTRY.BLOCK.
@@ -143,16 +142,6 @@ struct NamedBlock {
   std::string name;
   const Space* space;
 };
-
-/// Returns the names of the blocks that fit the role, without those in `excluded`.
-std::vector<std::string> FittingNames(const std::vector<NamedBlock>& blocks, const Space& role,
-                                      const std::set<std::string>& excluded = {}) {
-  std::vector<std::string> names;
-  for (const NamedBlock& block : blocks) {
-    if (Fits(*block.space, role) && !excluded.contains(block.name)) names.push_back(block.name);
-  }
-  return names;
-}
 
 /// Returns the blocks of the entries in `roles`, which is the name of a state entry or a list of
 /// such names.
@@ -178,47 +167,43 @@ bool IsOfEntry(const Space& role) {
   return !role.landmark() && (role.flags & ALIDADE_ROLE_OWNED) == 0;
 }
 
-/// Rejects a role that `candidates` do not determine.
+/// Rejects a role that `matching`, the blocks of its name, geometry and unit, do not determine.
 [[noreturn]] void FailRole(const Node& roles, const Space& role, const SensorModel& model,
-                           const std::vector<std::string>& candidates, const Blocks& blocks) {
-  std::vector<std::string> names = candidates;
-  if (names.empty()) {
-    for (const auto& [entry, spaces] : blocks) {
-      for (const Space& block : spaces) {
-        if (Fits(block, role)) names.push_back(entry + '.' + block.name);
-      }
-    }
+                           const std::vector<std::string>& matching,
+                           const std::vector<NamedBlock>& offered) {
+  std::vector<std::string> candidates = matching;
+  for (const NamedBlock& block : offered) {
+    if (matching.empty() && HasUnitOf(*block.space, role)) candidates.push_back(block.name);
   }
-  roles.Fail(
-      (candidates.empty() ? "no block fits" : "several blocks fit") + std::string(" role '") +
-          role.name + "' of model '" + model.name() + "' (" + ToString(role.geometry) +
-          (role.unit.empty() ? "" : ", " + role.unit) + ')',
-      "a map with " + role.name + ": " + (names.empty() ? "ENTRY.BLOCK" : Join(names, " or ")));
+  const std::string of_role = " role '" + role.name + "' of model '" + model.name() + "' (" +
+                              role.unit + (role.unit.empty() ? "" : ": ") + role.doc +
+                              ") in name, geometry and unit";
+  roles.Fail((matching.empty() ? "no block matches" : "several blocks match") + of_role,
+             "a map with " + role.name + ": " +
+                 (candidates.empty() ? "ENTRY.BLOCK" : Join(candidates, " or ")));
 }
 
 /// Binds the roles of `model` to the blocks `offered`. A role is bound to the block that has its
-/// name and fits. If no block has this name and the model needs the role, it is bound to the only
-/// other block that fits.
-void BindRoles(ConfigTree& roles, const SensorModel& model, const std::vector<NamedBlock>& offered,
-               const Blocks& blocks) {
-  const Node node(&roles);
+/// name, its geometry and a unit that does not differ. If only one block is offered, and no role
+/// has its name, it is bound to the first role that the model needs; ReadProblem then checks it.
+void BindRoles(ConfigTree& roles, const SensorModel& model,
+               const std::vector<NamedBlock>& offered) {
   std::map<std::string, std::string> bound;  // role -> block
-  std::set<std::string> used;
-  const auto bind = [&](const Space& role, const std::vector<std::string>& candidates) {
-    if (candidates.size() != 1) FailRole(node, role, model, candidates, blocks);
-    bound[role.name] = candidates.front();
-    used.insert(candidates.front());
-  };
   for (const Space& role : model.roles()) {
-    std::vector<NamedBlock> same_name = offered;
-    std::erase_if(same_name,
-                  [&](const NamedBlock& block) { return block.space->name != role.name; });
-    const std::vector<std::string> candidates = FittingNames(same_name, role);
-    if (IsOfEntry(role) && !candidates.empty()) bind(role, candidates);
+    std::vector<std::string> matching;
+    for (const auto& [name, space] : offered) {
+      const bool matches = space->name == role.name && space->geometry == role.geometry;
+      if (matches && HasUnitOf(*space, role)) matching.push_back(name);
+    }
+    if (!IsOfEntry(role) || matching.empty()) continue;
+    if (matching.size() > 1) FailRole(Node(&roles), role, model, matching, offered);
+    bound[role.name] = matching.front();
   }
   for (const Space& role : model.roles()) {
-    const bool is_open = IsOfEntry(role) && !role.optional() && !bound.contains(role.name);
-    if (is_open) bind(role, FittingNames(offered, role, used));
+    if (!IsOfEntry(role) || role.optional() || bound.contains(role.name)) continue;
+    const bool is_only = offered.size() == 1 && bound.empty();
+    if (!is_only) FailRole(Node(&roles), role, model, {}, offered);
+    bound[role.name] = offered.front().name;
   }
   FillMap(roles);
   for (const Space& role : model.roles()) {
@@ -284,7 +269,7 @@ void ExpandSensor(ConfigTree& entry, const PluginHost& host, const Blocks& block
   // The geometries of the blocks select the variant of the model.
   const SharedSensor model =
       host.CreateSensor(model_name->text, Node(&entry), {}, BoundGeometries(*roles, blocks));
-  if (has_names) BindRoles(*roles, *model, offered, blocks);
+  if (has_names) BindRoles(*roles, *model, offered);
   FillFromModel(entry, *model);
 }
 

@@ -99,12 +99,52 @@ TEST(ShortForms, TheRoleOfALandmarkIsOptional) {
   EXPECT_NE(Expanded(bound).find("landmark: landmarks"), std::string::npos);
 }
 
-TEST(ShortForms, ARoleWithoutABlockOfItsNameIsBoundByGeometry) {
-  // An entry with one block of the unit m.
-  std::string text = kStereo + "target}\n";
-  text.replace(text.find("{position: depth}"), 17, "{position: range}");
-  text.replace(text.find("depth: {mean"), 5, "range");
-  EXPECT_NE(Expanded(text).find("depth: target.range"), std::string::npos);
+TEST(ShortForms, TheOnlyBlockOfAnEntryNeedsNoName) {
+  const std::string text = Expanded(
+      "state: {range: {model: constant, initial: {value: exact}}}\n"
+      "sensors: {stereo: {model: stereo_disparity, stream: d, focal_px: 4, baseline_m: 1, "
+      "sigma_px: "
+      "1, roles: range}}\n");
+  EXPECT_NE(text.find("depth: range.value"), std::string::npos) << text;
+}
+
+// The reader of the sensor checks the only block, and selects the variant of the model by it.
+TEST(ShortForms, TheOnlyBlockOfAnEntryIsChecked) {
+  const std::string point = "state: {point: {model: constant, size: 2, initial: {value: exact}}}\n";
+  EXPECT_EQ(ErrorOf(point + "sensors: {fix: {model: direct, stream: f, sigma: 1, roles: point}}\n"),
+            "no error");
+  EXPECT_EQ(ErrorOf(point + "sensors: {stereo: {model: stereo_disparity, stream: d, focal_px: 4, "
+                            "baseline_m: 1, sigma_px: 1, roles: point}}\n"),
+            "f.yaml:2:104 sensors.stereo.roles.depth: block 'point.value' has geometry vector(2); "
+            "expected vector(1) for role 'depth' of model 'stereo_disparity'");
+}
+
+/// A robot whose blocks a sensor `direct` could all measure.
+constexpr const char* kRobot = R"(state:
+  robot:
+    model: planar_body_velocity
+    noise: {linear_acceleration: 1, angular_acceleration: 1}
+    initial: {position: exact, heading: exact, body_velocity: exact, turn_rate: exact}
+sensors:
+)";
+
+// Of these blocks, only the turn rate has the size of the default variant of `direct`. The sensor
+// may measure the heading.
+TEST(ShortForms, ABlockIsNotChosenByItsSize) {
+  EXPECT_EQ(ErrorOf(std::string(kRobot) +
+                    "  compass: {model: direct, stream: c, sigma: 1, roles: robot}\n"),
+            "f.yaml:7:56 sensors.compass.roles: no block matches role 'value' of model 'direct' "
+            "(block that is measured) in name, geometry and unit; expected a map with value: "
+            "robot.position or robot.heading or robot.body_velocity or robot.turn_rate");
+}
+
+// The sensor needs the velocity in the world. The state has that in the frame of the body.
+TEST(ShortForms, ABlockIsNotChosenByItsUnit) {
+  EXPECT_EQ(ErrorOf(std::string(kRobot) +
+                    "  wheels: {model: body_velocity, stream: w, sigma_m_s: 1, roles: robot}\n"),
+            "f.yaml:7:66 sensors.wheels.roles: no block matches role 'velocity' of model "
+            "'body_velocity' (m/s: velocity of the body in the world) in name, geometry and unit; "
+            "expected a map with velocity: robot.body_velocity");
 }
 
 // The geometry of the block selects the variant of the sensor `position`.
@@ -139,8 +179,9 @@ TEST(ShortForms, ErrorsOfRolesListTheCandidates) {
       "template, or a map {ROLE: ENTRY.BLOCK}; did you mean 'target'?");
   EXPECT_EQ(ErrorOf(std::string(kPose) + "sensors:\n  stereo: {model: stereo_disparity, stream: d, "
                                          "focal_px: 4, baseline_m: 1, sigma_px: 1, roles: cam}\n"),
-            "f.yaml:11:96 sensors.stereo.roles: no block fits role 'depth' of model "
-            "'stereo_disparity' (vector(1), m); expected a map with depth: ENTRY.BLOCK");
+            "f.yaml:11:96 sensors.stereo.roles: no block matches role 'depth' of model "
+            "'stereo_disparity' (m: depth along the optical axis) in name, geometry and unit; "
+            "expected a map with depth: cam.position or cam.orientation");
 }
 
 TEST(ShortForms, AnAmbiguousRoleIsAnError) {
@@ -149,9 +190,9 @@ TEST(ShortForms, AnAmbiguousRoleIsAnError) {
                "  other: {model: constant_velocity, noise: {acceleration: 1}, blocks: {position: "
                "depth}, initial: {depth: exact, velocity: exact}}\n");
   EXPECT_EQ(ErrorOf(text),
-            "f.yaml:11:96 sensors.stereo.roles: several blocks fit role 'depth' of model "
-            "'stereo_disparity' (vector(1), m); expected a map with depth: target.depth or "
-            "other.depth");
+            "f.yaml:11:96 sensors.stereo.roles: several blocks match role 'depth' of model "
+            "'stereo_disparity' (m: depth along the optical axis) in name, geometry and unit; "
+            "expected a map with depth: target.depth or other.depth");
 }
 
 TEST(ShortForms, MissingMeansAreNeutralElements) {

@@ -7,7 +7,8 @@ namespace alidade {
 
 /// Velocity of a point on a body, in the frame of the sensor, along M of the D axes, in the plane
 /// (D = 2) or in space (D = 3): wheel speed, Doppler velocity log. With z = 0 along the y axis: a
-/// vehicle that does not slip sideways.
+/// vehicle that does not slip sideways. If the velocity in the frame of the body is a block, as in
+/// planar_body_velocity, the sensor `direct` measures it.
 ///
 ///   model      z = S B' (R' v + omega x l) + n,   n ~ N(0, diag(sigma^2))
 ///   Jacobian   automatic differentiation               M x roles

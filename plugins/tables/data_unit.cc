@@ -26,11 +26,11 @@ constexpr std::pair<std::string_view, double> kFactors[] = {
     {"mbar", 1e2},
     {"kPa", 1e3},
     {"bar", 1e5},
-    {"T", 1.0},
-    {"mT", 1e-3},
-    {"uT", 1e-6},
-    {"nT", 1e-9},
-    {"gauss", 1e-4},
+    {"T", 1e6},
+    {"mT", 1e3},
+    {"uT", 1.0},
+    {"nT", 1e-3},
+    {"gauss", 100.0},
 };
 
 std::optional<double> FactorOf(std::string_view name) {

@@ -26,6 +26,10 @@ void ReadForEachColumn(const Node& node, const char* key, TableField& field, con
   if (!found) return;
   const std::vector<Node> items = found->ItemsOrOne();
   const std::size_t count = field.conversions.size();
+  if (field.geodetic && items.size() == 1 && count == 3) {
+    found->Fail("one value would apply to the angles and to the height",
+                "a list with a value for each of latitude, longitude and height");
+  }
   if (items.size() != 1 && items.size() != count) {
     found->Fail("a list of " + std::to_string(items.size()),
                 "one value, or " + std::to_string(count) + ", one for each column");
@@ -69,10 +73,12 @@ void ReadConversions(const Node& node, TableField& field) {
   if (const auto reciprocal = node.Find("reciprocal")) field.reciprocal = reciprocal->Flag();
 }
 
-/// Reads the columns of a geodetic position. They are in deg, deg and m, unless `unit` is given.
-void ReadGeodetic(const Node& node, TableField& field) {
+/// Reads the conversions of a field. The columns of a geodetic position are in deg, deg and m,
+/// unless `unit` is given.
+void ReadGeodeticAndConversions(const Node& node, TableField& field) {
   const std::optional<Node> geodetic = node.Find("geodetic");
   field.geodetic = geodetic && geodetic->Flag();
+  ReadConversions(node, field);
   if (!field.geodetic) return;
   const std::size_t count = field.columns.size();
   if (count < 2 || count > 3 || field.reciprocal) {
@@ -182,10 +188,7 @@ void ReadFieldMap(const std::string& name, const Node& node, bool is_stream, Tab
     field.columns = ReadColumns(node.At("columns", name));
   }
   field.info.size = static_cast<int>(constant ? field.constant.size() : field.columns.size());
-  if (!constant) {
-    ReadConversions(node, field);
-    ReadGeodetic(node, field);
-  }
+  if (!constant) ReadGeodeticAndConversions(node, field);
   if (const auto rows = node.Find("rows")) field.conditions = ReadConditions(*rows);
   if (const auto valid = node.Find("valid")) field.valid = ReadColumn(*valid);
   if (is_stream) ReadStreamKeys(node, field);
@@ -220,7 +223,11 @@ Timestamp ReadTime(const Node& entry, TableTime& time) {
   const std::optional<Node> node = entry.Find("time");
   const std::optional<Node> rate = entry.Find("rate_hz");
   if (rate) {
-    if (node) rate->Fail("'time' and 'rate_hz' are both given", "only one of these keys");
+    for (const char* const key : {"time", "max_gap_s"}) {
+      if (!entry.Find(key)) continue;
+      rate->Fail("'" + std::string(key) + "' and 'rate_hz' are both given",
+                 "only one of these keys");
+    }
     time.rate_hz = rate->Number(1e-3, 1e9);
     return 0;
   }

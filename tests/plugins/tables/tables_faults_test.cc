@@ -194,6 +194,9 @@ TEST_F(Tables, TimeAndRateExcludeEachOther) {
   ExpectBadConfig("path: a.csv\ntime: {column: t_s}\nrate_hz: 30\nstreams: {d: scale}\n",
                   "run.yaml:3:10 rate_hz: 'time' and 'rate_hz' are both given; expected only "
                   "one of these keys");
+  ExpectBadConfig("path: a.csv\nmax_gap_s: 1\nrate_hz: 30\nstreams: {d: scale}\n",
+                  "run.yaml:3:10 rate_hz: 'max_gap_s' and 'rate_hz' are both given; expected only "
+                  "one of these keys");
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ TEST(DataUnit, HasTheFactorsOfTheStandards) {
   EXPECT_DOUBLE_EQ(factor("rpm"), std::numbers::pi / 30.0);
   EXPECT_DOUBLE_EQ(factor("mm/s^2"), 1e-3);
   EXPECT_DOUBLE_EQ(factor("hPa"), 100.0);
-  EXPECT_DOUBLE_EQ(factor("gauss"), 1e-4);
+  EXPECT_DOUBLE_EQ(factor("gauss"), 100.0) << "uT, as sensor magnetometer";
   for (const char* unit : {"", "furlong", "m/", "/s", "m s", "DEGREE"}) {
     EXPECT_FALSE(DataUnitFactor(unit)) << unit;
   }
@@ -230,6 +230,14 @@ TEST_F(Tables, AGainScalesGeodeticDegrees) {
               1e-6);
   EXPECT_EQ(frames[1].measurements[0].covariance, (std::vector<double>{9, 0, 0, 9}))
       << "sigma is in m";
+}
+
+TEST_F(Tables, RefusesOneUnitForAnglesAndHeight) {
+  Write("t_s,lat,lon,h\n0,48,11,520\n");
+  ExpectBadConfig(
+      "path: a.csv\nstreams: {gps: {columns: [lat, lon, h], geodetic: true, unit: deg}}\n",
+      "run.yaml:2:63 streams.gps.unit: one value would apply to the angles and to the height; "
+      "expected a list with a value for each of latitude, longitude and height");
 }
 
 TEST_F(Tables, RefusesWhatIsNoPosition) {

@@ -324,6 +324,29 @@ void Resolve(const std::vector<std::string>& names, const std::string& file, Tab
   column.index = static_cast<std::size_t>(found - names.begin());
 }
 
+/// Calls `visit` with each column of the table that the config names.
+template <class Layout, class F>
+void ForEachColumn(Layout& layout, const F& visit) {
+  const auto visit_all = [&](auto& columns) {
+    for (auto& column : columns) visit(column);
+  };
+  const auto visit_optional = [&](auto& column) {
+    if (column) visit(*column);
+  };
+  visit_optional(layout.time.column);
+  for (auto* fields : {&layout.streams, &layout.truths}) {
+    for (auto& field : *fields) {
+      visit_all(field.columns);
+      if (field.covariance) visit_all(field.covariance->columns);
+      visit_all(field.known);
+      if (field.known_table) visit(field.known_table->id);
+      visit_optional(field.landmark);
+      visit_optional(field.valid);
+      for (auto& condition : field.conditions) visit(condition.column);
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<TableColumn> ReadColumns(const Node& node) {
@@ -370,26 +393,17 @@ TableLayout ReadTableLayout(const Node& entry) {
   return layout;
 }
 
+std::size_t CountColumns(const std::vector<std::string>& names, const TableLayout& layout) {
+  std::size_t count = 0;
+  ForEachColumn(layout, [&](const TableColumn& column) {
+    if (std::ranges::find(names, column.name) != names.end()) ++count;
+  });
+  return count;
+}
+
 void ResolveColumns(const std::vector<std::string>& names, const std::string& file,
                     TableLayout& layout) {
-  const auto resolve = [&](auto& columns) {
-    for (TableColumn& column : columns) Resolve(names, file, column);
-  };
-  const auto resolve_optional = [&](std::optional<TableColumn>& column) {
-    if (column) Resolve(names, file, *column);
-  };
-  resolve_optional(layout.time.column);
-  for (std::vector<TableField>* fields : {&layout.streams, &layout.truths}) {
-    for (TableField& field : *fields) {
-      resolve(field.columns);
-      if (field.covariance) resolve(field.covariance->columns);
-      resolve(field.known);
-      if (field.known_table) Resolve(names, file, field.known_table->id);
-      resolve_optional(field.landmark);
-      resolve_optional(field.valid);
-      for (RowCondition& condition : field.conditions) Resolve(names, file, condition.column);
-    }
-  }
+  ForEachColumn(layout, [&](TableColumn& column) { Resolve(names, file, column); });
 }
 
 }  // namespace alidade

@@ -110,6 +110,9 @@ std::vector<TableColumn> ReadColumns(const Node& node);
 /// Reads all keys of kTableKeys except `path`. Errors: kBadConfig.
 TableLayout ReadTableLayout(const Node& entry);
 
+/// Returns the number of columns of the layout that `names` contains.
+std::size_t CountColumns(const std::vector<std::string>& names, const TableLayout& layout);
+
 /// Finds the columns of the layout in the header of `file`. Errors: kBadConfig at the place in the
 /// config, with the nearest name and the list of columns.
 void ResolveColumns(const std::vector<std::string>& names, const std::string& file,

@@ -17,16 +17,6 @@ namespace {
 
 bool IsBlank(std::string_view line) { return line.find_first_not_of(" \t") == line.npos; }
 
-/// Returns the separator that a line contains, or ',' if the line has a single cell.
-char SeparatorIn(std::string_view line) {
-  for (const char separator : {';', ',', '\t', '|'}) {
-    if (line.find(separator) != line.npos) return separator;
-  }
-  const std::size_t first = std::min(line.find_first_not_of(' '), line.size());
-  const bool has_blanks = cell::Trim(line.substr(first)).find(' ') != line.npos;
-  return has_blanks ? ' ' : ',';
-}
-
 std::vector<std::string> Cells(const TableRow& row) {
   std::vector<std::string> cells;
   for (std::size_t i = 0; i < row.size(); ++i) {
@@ -87,24 +77,40 @@ void TableReader::ReadHeader(TableCalibration& calibration) {
          "a table as text; to read a compressed table, use a pipe: zcat FILE | alidade run "
          "CONFIG --set source.path=-");
   }
-  if (layout_.separator == '\0') layout_.separator = SeparatorIn(line_);
-  row_.Split(line_, first_line_, layout_.separator);
-  std::vector<std::string> names = Cells(row_);
-  reference_ = "line " + std::to_string(first_line_);
-  if (!layout_.columns.empty()) {
-    names = layout_.columns;
-    reference_ = "'columns'";
-    holds_line_ = true;
-  } else if (HasNumber(names) && !comment.empty()) {
-    row_.Split(comment, comment_line, layout_.separator);
-    if (row_.size() == names.size()) {
-      names = Cells(row_);
-      reference_ = "line " + std::to_string(comment_line);
-      holds_line_ = true;
-    }
+  if (layout_.separator == '\0') layout_.separator = DetectSeparator(comment, comment_line);
+  const Header header = HeaderWith(layout_.separator, comment, comment_line);
+  holds_line_ = !header.is_line;
+  reference_ = header.reference;
+  column_count_ = header.names.size();
+  ResolveColumns(header.names, reader_.name(), layout_);
+}
+
+/// Returns the names of the columns if `separator` is that of the table.
+TableReader::Header TableReader::HeaderWith(char separator, std::string_view comment,
+                                            int comment_line) {
+  row_.Split(line_, first_line_, separator);
+  if (!layout_.columns.empty()) return {layout_.columns, "'columns'", false};
+  Header header{Cells(row_), "line " + std::to_string(first_line_), true};
+  if (!HasNumber(header.names) || comment.empty()) return header;
+  row_.Split(comment, comment_line, separator);
+  if (row_.size() != header.names.size()) return header;
+  return {Cells(row_), "line " + std::to_string(comment_line), false};
+}
+
+/// Returns the separator with which the header has the most columns of the config. A comma precedes
+/// other separators, and a separator that the first line contains precedes one that it lacks.
+char TableReader::DetectSeparator(std::string_view comment, int comment_line) {
+  char best = ',';
+  std::size_t highest = 0;
+  for (const char separator : {',', ';', '\t', '|', ' '}) {
+    const std::vector<std::string> names = HeaderWith(separator, comment, comment_line).names;
+    row_.Split(line_, first_line_, separator);
+    const std::size_t found = row_.size() == names.size() ? CountColumns(names, layout_) : 0;
+    const std::size_t score = 2 * found + (row_.size() > 1 ? 1 : 0);
+    if (score > highest) best = separator;
+    highest = std::max(highest, score);
   }
-  column_count_ = names.size();
-  ResolveColumns(names, reader_.name(), layout_);
+  return best;
 }
 
 void TableReader::CountRows(bool any_order) {

@@ -47,8 +47,16 @@ class TableReader {
   Timestamp EarliestNext() const;
 
  private:
+  struct Header {
+    std::vector<std::string> names;
+    std::string reference;  ///< place that names the columns, such as `line 1`
+    bool is_line;           ///< false if the first line is a row
+  };
+
   bool NextLine();
   void ReadHeader(TableCalibration& calibration);
+  Header HeaderWith(char separator, std::string_view comment, int comment_line);
+  char DetectSeparator(std::string_view comment, int comment_line);
   void CountRows(bool any_order);
   Timestamp ReadTimestamp() const;
   void CheckOrder(Timestamp timestamp) const;

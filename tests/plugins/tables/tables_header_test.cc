@@ -16,6 +16,26 @@ TEST_F(Tables, DetectsTheSeparator) {
   }
 }
 
+TEST_F(Tables, OtherSeparatorsOccurInTheNames) {
+  Write("t_s,z; a | b,w\n0,1,2\n");
+  EXPECT_EQ(Shown(Frames("path: a.csv\nstreams: {z: ['z; a | b', w]}\n")), (Text{"0 s0=1,2"}));
+  Write("t_s;x, east;w y\n0;1;2\n");
+  EXPECT_EQ(Shown(Frames("path: a.csv\nstreams: {z: ['x, east', w y]}\n")), (Text{"0 s0=1,2"}));
+  Write("# t_s;x, east\n0;1\n");
+  EXPECT_EQ(Shown(Frames("path: a.csv\nstreams: {z: 'x, east'}\n")), (Text{"0 s0=1"}));
+  Write("0;1;2,5\n");
+  EXPECT_EQ(Shown(Frames("path: a.csv\ncolumns: [t_s, z, text]\nstreams: {z: z}\n")),
+            (Text{"0 s0=1"}));
+}
+
+// The first separator of the line is that of the message.
+TEST_F(Tables, ATableWithoutColumnsOfTheConfigHasASeparator) {
+  Write("t;east\n0;1\n");
+  ExpectBadConfig("path: a.csv\ntime: {column: s}\nstreams: {z: z}\n",
+                  "run.yaml:2:16 time.column: there is no column 's' in FILE; expected one of t, "
+                  "east; did you mean 't'?");
+}
+
 TEST_F(Tables, AGivenSeparatorIsUsed) {
   Write("a;b,z\n1;2,3\n");
   EXPECT_EQ(Shown(Frames("path: a.csv\nseparator: ','\nrate_hz: 1\nstreams: {z: z}\n")),

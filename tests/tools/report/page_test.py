@@ -677,7 +677,7 @@ class Hostile(PageCase):
     def test_hostile_names_are_shown(self):
         stream = "<b onmouseover='window.attacked = 1'>stream</b>"
         (self.root / "streams.csv").write_text(f"t_s,{ATTACK}\n0,86\n0.1,87\n0.2,88\n")
-        text = BROKEN.replace("data.csv", "streams.csv, separator: ','")
+        text = BROKEN.replace("data.csv", "streams.csv")
         text = text.replace("disparity_px", json.dumps(ATTACK))
         text = text.replace("stream: disparity", "stream: " + json.dumps(stream))
         text = text.replace("{disparity:", "{" + json.dumps(stream) + ":")

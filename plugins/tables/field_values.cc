@@ -108,11 +108,12 @@ std::int64_t ReadLandmark(const TableRow& row, const TableColumn& column) {
 }  // namespace
 
 bool IsSelected(const TableRow& row, const TableField& field) {
-  return std::ranges::all_of(field.conditions, [&](const RowCondition& condition) {
+  const auto is_met = [&](const RowCondition& condition) {
     const std::string_view text = row.Text(condition.column);
     return std::ranges::any_of(condition.texts,
                                [&](const std::string& wanted) { return AreEqual(text, wanted); });
-  });
+  };
+  return std::ranges::all_of(field.conditions, is_met) && HasIdOf(row, field);
 }
 
 bool ReadValues(const TableRow& row, const TableField& field, LocalFrame& frame,

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "alidade/base/number_text.h"
 #include "alidade/io/text_cell.h"
 #include "table_calibration.h"
 #include "table_reader.h"
@@ -58,6 +59,27 @@ void ReadKnownTable(const std::filesystem::path& folder, KnownTable& table) {
                "one row for each id");
     }
   }
+}
+
+std::vector<TableField> StreamsById(const TableField& stream) {
+  std::vector<TableField> streams;
+  for (const auto& [id, row] : stream.known_table->rows) {
+    const double* const number = std::get_if<double>(&id);
+    const std::string text =
+        number != nullptr ? internal::NumberText(*number) : std::get<std::string>(id);
+    TableField& field = streams.emplace_back(stream);
+    field.info.name.replace(field.info.name.find('*'), 1, text);
+    field.id = id;
+  }
+  return streams;
+}
+
+bool HasIdOf(const TableRow& reading, const TableField& stream) {
+  if (!stream.id) return true;
+  const TableColumn& column = stream.known_table->id;
+  if (reading.IsMissing(column)) return false;
+  static_cast<void>(KnownNumbers(reading, *stream.known_table));
+  return ReadId(reading.Text(column)) == *stream.id;
 }
 
 const std::vector<double>& KnownNumbers(const TableRow& reading, const KnownTable& table) {

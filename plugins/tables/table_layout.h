@@ -74,6 +74,7 @@ struct TableField {
   std::optional<CovarianceColumns> covariance;
   std::vector<TableColumn> known;         ///< columns of the known numbers of a measurement
   std::optional<KnownTable> known_table;  ///< replaces `known`
+  std::optional<KnownTable::Id> id;       ///< only id whose rows the stream uses
   std::optional<TableColumn> landmark, valid;
   std::vector<RowCondition> conditions;
   Timestamp delay = 0;                 ///< time from the measurement to the time of its row

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -88,9 +89,7 @@ class TablesSource : public Source {
 
   void AddTable(const Node& entry, const std::filesystem::path& folder) {
     TableLayout layout = ReadTableLayout(entry);
-    for (TableField& stream : layout.streams) {
-      if (stream.known_table) ReadKnownTable(folder, *stream.known_table);
-    }
+    layout.streams = ReadKnownTables(entry, folder, std::move(layout.streams));
     const Node path = entry.At("path", "tables");
     const auto is_standard_input = [](const Table& table) {
       return table.reader->name() == "<stdin>";
@@ -104,6 +103,29 @@ class TablesSource : public Source {
     AddNames(layout.truths, entry, truths_);
     tables_.back().reader = std::make_unique<TableReader>(std::move(layout), ReadPath(path, folder),
                                                           path, any_order_, calibration_);
+  }
+
+  /// Reads the tables of known numbers. Returns the streams, with one stream for each id in place
+  /// of a stream whose name contains `*`.
+  static std::vector<TableField> ReadKnownTables(const Node& entry,
+                                                 const std::filesystem::path& folder,
+                                                 std::vector<TableField> fields) {
+    std::vector<TableField> streams;
+    for (TableField& field : fields) {
+      if (field.known_table) ReadKnownTable(folder, *field.known_table);
+      if (field.info.name.find('*') == std::string::npos) {
+        streams.push_back(std::move(field));
+        continue;
+      }
+      if (!field.known_table) {
+        entry.At("streams")
+            .At(field.info.name)
+            .Fail("the name contains `*`, which stands for the ids of a table of known numbers",
+                  "known: {path: beacons.csv, id: beacon, columns: [x, y]}, or a name without `*`");
+      }
+      std::ranges::move(StreamsById(field), std::back_inserter(streams));
+    }
+    return streams;
   }
 
   static void AddNames(const std::vector<TableField>& fields, const Node& entry,

@@ -12,6 +12,7 @@
 #include "alidade/experiment/run.h"
 #include "alidade/experiment/short_forms.h"
 #include "alidade/experiment/source_plugin.h"
+#include "alidade/experiment/stream_patterns.h"
 #include "alidade/experiment/truth_match.h"
 #include "alidade/io/text_table.h"
 #include "alidade/plugin/plugin_host.h"
@@ -264,6 +265,7 @@ Experiment BuildExperiment(const Config& written, const PluginHost& host) {
   experiment.source = CreateSource(host, config, experiment.seed,
                                    experiment.out_of_sequence.policy != OutOfSequence::kReject);
   Config calibrated = internal::WithCalibration(config, *experiment.source);
+  ExpandStreamPatterns(calibrated, experiment.source->streams());
   ExpandShortForms(calibrated, host);
   experiment.config = internal::WithoutCalibration(calibrated);
   source.RejectUnread();

@@ -66,6 +66,38 @@ TEST_F(KnownTables, RowsSelectTheReadingsThatNeedAnId) {
   EXPECT_EQ(frames[0].measurements[0].known, std::vector<double>{11.0});
 }
 
+TEST_F(KnownTables, AStarStandsForEachId) {
+  Write("beacons.csv", kBeacons);
+  Write("t_s,beacon,r\n0,A7,5\n1, 1.0,6\n2,,7\n3,1,8\n");
+  const std::string config =
+      "path: a.csv\nstreams: {range_*_m: {columns: r, known: {path: beacons.csv, id: beacon, "
+      "columns: [x, y]}}, other: r}\n";
+  const auto source = Open(config);
+  ASSERT_EQ(source->streams().size(), 3u);
+  EXPECT_EQ(source->streams()[0].name, "range_1_m");
+  EXPECT_EQ(source->streams()[1].name, "range_A7_m");
+  EXPECT_EQ(source->streams()[1].known, 2);
+  EXPECT_EQ(source->streams()[2].name, "other");
+  const auto frames = Frames(config);
+  EXPECT_EQ(Shown(frames), (std::vector<std::string>{"0 s1=5 s2=5", "1000 s0=6 s2=6", "2000 s2=7",
+                                                     "3000 s0=8 s2=8"}));
+  EXPECT_EQ(frames[0].measurements[0].known, (std::vector<double>{21.0, 20.0}));
+  EXPECT_EQ(frames[3].measurements[0].known, (std::vector<double>{11.0, 10.0}));
+  ExpectBadData("t_s,beacon,r\n0,1,5\n1,2,6\n",
+                "FILE:3:3 beacon: '2' is not an id in " +
+                    InBeacons("; expected a row with this id in that table, or readings selected "
+                              "by 'rows: {beacon: [..]}'"),
+                config);
+}
+
+TEST_F(KnownTables, AStarNeedsATableOfKnownNumbers) {
+  Write("t_s,r\n0,5\n");
+  ExpectBadConfig("path: a.csv\nstreams: {range_*: r}\n",
+                  "run.yaml:2:20 streams.range_*: the name contains `*`, which stands for the ids "
+                  "of a table of known numbers; expected known: {path: beacons.csv, id: beacon, "
+                  "columns: [x, y]}, or a name without `*`");
+}
+
 TEST_F(KnownTables, AnIdTwice) {
   Write("beacons.csv", "beacon,x,y\n1,2,3\n4,5,6\n1.0,7,8\n");
   ExpectBadData("t_s,beacon,r\n0,1,5\n",

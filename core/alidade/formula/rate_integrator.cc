@@ -25,11 +25,12 @@ double Legendre(int k, double fraction) {
   return std::sqrt(5.0) * (1.5 * x * x - 0.5) * 0.4;
 }
 
-/// Divides the values of unit length in y, and their rows of the Jacobian, by their length.
+/// Divides the unit quaternions in y, and their rows of the Jacobian, by their length. Blocks of
+/// other geometries are vectors, angles, or constant.
 void NormaliseRows(const std::vector<Geometry>& blocks, double* y, double* jacobian, int columns) {
   int row = 0;
   for (const Geometry& block : blocks) {
-    if (!block.is_vector() && !block.is_angle()) {
+    if (block == Geometry::UnitQuaternion()) {
       double squared = 0.0;
       for (int i = 0; i < block.ambient; ++i) squared += y[row + i] * y[row + i];
       const double inverse = 1.0 / std::sqrt(squared);

@@ -156,6 +156,17 @@ TEST(FormulaMotion, ABlockWithoutAnExpressionIsConstant) {
   EXPECT_EQ(step.f, (std::vector<double>{1, 0.5, 0, 1}));
 }
 
+TEST(FormulaMotion, AGroupWithoutAnExpressionIsConstant) {
+  const std::string keys = "blocks: {v: number, pose: se_3_left, planar: se_2_left}\n";
+  const Blocks x = {{1}, {3, 4, 0, 0.5, -0.5, 0.5, 0.5}, {0, 0, 1}};
+  for (const char* equation : {"rate: {v: 0}\n", "step: {v: v}\n"}) {
+    const SharedMotion motion = FormulaMotionOf(keys + equation);
+    const Linear linear = Linearise(motion, x, 0.5);
+    EXPECT_LT((linear.f - RowMajor::Identity(10, 10)).cwiseAbs().maxCoeff(), 1e-15) << equation;
+    EXPECT_EQ(testing::StepWithJacobians(motion, x, nullptr, nullptr, 0.5).next, x) << equation;
+  }
+}
+
 TEST(FormulaMotion, ErrorsNameTheKey) {
   const auto error = [](const std::string& yaml) {
     return Message([&] { FormulaMotionOf(yaml); });

@@ -203,13 +203,18 @@ class MotionReader {
     geometries.push_back(Geometry::Vector(static_cast<int>(noises_.size())));
     geometries.push_back(Geometry::Vector(1));
     CompiledFunction function(std::move(geometries), entry_);
+    const auto declare = [&](Scope& scope) {
+      DeclareBlocksAndInput(function, scope);
+      DeclareSpaces(noises_, function.offset(noise), entry_, scope);
+      scope.Declare("dt", {{{function.offset(noise + 1)}}}, entry_);
+      keys_.AddTo(scope);
+    };
     Scope scope(function.program());
-    DeclareBlocksAndInput(function, scope);
-    DeclareSpaces(noises_, function.offset(noise), entry_, scope);
-    const int dt = function.offset(noise + 1);
-    scope.Declare("dt", {{{dt}}}, entry_);
-    keys_.AddTo(scope);
-    keys_.CheckDefinitions(scope);
+    declare(scope);
+    Program checked(function.program().variables());
+    Scope checked_scope(checked);
+    declare(checked_scope);
+    keys_.CheckDefinitions(checked_scope);
     map.ExpectMap("{BLOCK: EXPRESSION}");
     for (std::size_t k = 0; k < blocks_.size(); ++k) {
       Space& block = blocks_[k];

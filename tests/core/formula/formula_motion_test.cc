@@ -167,6 +167,13 @@ TEST(FormulaMotion, AGroupWithoutAnExpressionIsConstant) {
   }
 }
 
+TEST(FormulaMotion, AnUnusedDefinitionIsNotEvaluated) {
+  const SharedMotion motion =
+      FormulaMotionOf("blocks: {v: [x, y]}\nlet: {course: 'atan2(v.y, v.x)'}\nrate: {v: -v}\n");
+  const Linear linear = Linearise(motion, {{0, 0}}, 0.1);
+  EXPECT_NEAR(linear.f(0, 0), std::exp(-0.1), 1e-7);  // the error is 0.1^5 / 120
+}
+
 TEST(FormulaMotion, ErrorsNameTheKey) {
   const auto error = [](const std::string& yaml) {
     return Message([&] { FormulaMotionOf(yaml); });

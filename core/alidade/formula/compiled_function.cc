@@ -186,7 +186,7 @@ void DeclareSpaces(const std::vector<Space>& spaces, int first, const Node& owne
     symbol.value.geometry = space.geometry.row().number;
     for (int i = 0; i < space.geometry.ambient; ++i) symbol.value.nodes.push_back(first++);
     const bool has_names = std::ssize(space.elements) == space.geometry.ambient;
-    if (has_names && space.geometry.ambient > 1) symbol.value.elements = space.elements;
+    if (has_names && !space.elements[0].empty()) symbol.value.elements = space.elements;
     scope.Declare(space.name, std::move(symbol), owner);
   }
 }

@@ -177,7 +177,7 @@ class SensorReader {
       Value value;
       value.geometry = part.geometry.row().number;
       for (int i = 0; i < part.geometry.ambient; ++i) value.nodes.push_back(first++);
-      if (value.size() > 1) value.elements = part.elements;
+      if (!part.elements[0].empty()) value.elements = part.elements;
       symbol.value.nodes.insert(symbol.value.nodes.end(), value.nodes.begin(), value.nodes.end());
       symbol.parts.emplace_back(part.name, std::move(value));
     }
@@ -295,12 +295,13 @@ class SensorReader {
 
   /// Compiles all definitions with all names that an expression of the sensor may use.
   void CheckDefinitions() const {
-    std::vector<Geometry> geometries = GeometriesOf(roles_);
-    geometries.push_back(Measurement().geometry);
-    CompiledFunction function(WithKnown(std::move(geometries)), entry_);
-    Scope scope(function.program());
-    Declare(roles_, KnownOffset(function), scope);
-    DeclareMeasurement(function.offset(roles_.size()), scope);
+    int measured = 0;
+    for (const Space& role : roles_) measured += role.geometry.ambient;
+    const int known = measured + Measurement().geometry.ambient;
+    Program program(known + known_space_.geometry.ambient);
+    Scope scope(program);
+    Declare(roles_, known, scope);
+    DeclareMeasurement(measured, scope);
     keys_.CheckDefinitions(scope);
   }
 

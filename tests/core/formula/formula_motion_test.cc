@@ -174,6 +174,14 @@ TEST(FormulaMotion, AnUnusedDefinitionIsNotEvaluated) {
   EXPECT_NEAR(linear.f(0, 0), std::exp(-0.1), 1e-7);  // the error is 0.1^5 / 120
 }
 
+TEST(FormulaMotion, AListOfOneElementHasItsName) {
+  const SharedMotion motion =
+      FormulaMotionOf("blocks: {heading: angle}\ninputs: {u: [omega]}\nrate: {heading: u.omega}\n");
+  const double u = 0.4;
+  const auto step = testing::StepWithJacobians(motion, {{0.1}}, &u, nullptr, 0.5);
+  EXPECT_NEAR(step.next[0][0], 0.3, 1e-15);
+}
+
 TEST(FormulaMotion, ErrorsNameTheKey) {
   const auto error = [](const std::string& yaml) {
     return Message([&] { FormulaMotionOf(yaml); });

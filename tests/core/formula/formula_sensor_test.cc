@@ -198,6 +198,14 @@ initialise:
   EXPECT_LT(LargestDifference(jacobian, numeric), 1e-9);
 }
 
+TEST(FormulaSensor, HasUpTo64Inputs) {
+  const std::string yaml = "let: {twice: 2 * p}\nz: {a: 'p[0]', b: 'p[63]'}\nsigma: {a: 1, b: 1}\n";
+  const SharedSensor sensor = FormulaSensorOf(yaml, {VectorSpace("p", 64)});
+  Blocks p = {std::vector<double>(64, 1.0)};
+  p[0][63] = 7.0;
+  EXPECT_EQ(PredictionOf(sensor, p), (std::vector<double>{1, 7}));
+}
+
 TEST(FormulaSensor, ErrorsNameTheKey) {
   const auto error = [](const std::string& yaml) {
     return Message([&] { FormulaSensorOf(yaml, {VectorSpace("p", 2)}); });

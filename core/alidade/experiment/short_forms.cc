@@ -211,12 +211,15 @@ void BindRoles(ConfigTree& roles, const SensorModel& model,
   }
 }
 
-/// Binds each block to a role of the same name, if no earlier block has this name.
-void BindEachBlock(ConfigTree& roles, const std::vector<NamedBlock>& offered) {
+/// Binds each block to a role of the same name, if no earlier block has this name. Omits blocks
+/// without a matrix if the sensor has a map `matrices`.
+void BindEachBlock(ConfigTree& roles, const std::vector<NamedBlock>& offered,
+                   const ConfigTree* matrices) {
   FillMap(roles);
   for (const NamedBlock& block : offered) {
     const std::string& role = block.space->name;
-    if (Child(roles, role) == nullptr) FillText(roles, role, block.name);
+    const bool is_needed = matrices == nullptr || Child(*matrices, role) != nullptr;
+    if (is_needed && Child(roles, role) == nullptr) FillText(roles, role, block.name);
   }
 }
 
@@ -263,7 +266,7 @@ void ExpandSensor(ConfigTree& entry, const PluginHost& host, const Blocks& block
   const bool has_names = roles->kind == Node::Kind::kScalar || roles->kind == Node::Kind::kList;
   if (has_names) {
     offered = BlocksOf(Node(roles), blocks);
-    BindEachBlock(*roles, offered);
+    BindEachBlock(*roles, offered, ChildMap(entry, "H"));
   }
   if (internal::HasEquationsInConfig(model_name->text)) return;
   // The geometries of the blocks select the variant of the model.

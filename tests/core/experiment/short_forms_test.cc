@@ -172,6 +172,17 @@ TEST(ShortForms, RolesOfAFormulaHaveTheNamesOfTheBlocks) {
       << text;
 }
 
+TEST(ShortForms, RolesOfMatricesAreThoseOfH) {
+  const std::string linear = std::string(kDepth) +
+                             "  s: {model: linear, stream: s, z: {a: number}, sigma: {a: 1}, "
+                             "H: {depth: 1, bias: 1}, owns: {bias: number}, initial: {bias: "
+                             "{mean: 0, sigma: 1}}, roles: ";
+  const std::string text = Expanded(linear + "target}\n");
+  EXPECT_NE(text.find("roles:\n      depth: target.depth\n"), std::string::npos) << text;
+  EXPECT_EQ(text.find("velocity: target.velocity"), std::string::npos) << text;
+  EXPECT_EQ(ErrorOf(linear + "target}\n"), "no error");
+}
+
 TEST(ShortForms, ErrorsOfRolesListTheCandidates) {
   EXPECT_EQ(
       ErrorOf(kStereo + "tagret}\n"),

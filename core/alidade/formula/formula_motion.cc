@@ -81,7 +81,7 @@ class FormulaMotion final : public MotionModel {
   }
 
   /// Computes the diagonal matrix of the standard deviations. Those of continuous noise are divided
-  /// by the root of dt.
+  /// by the root of dt; they are 0 for dt = 0.
   Status EvaluateNoise(const double* const* block_values, const double* input, double dt_s,
                        double* sqrt_q) const {
     std::array<const double*, kMaxInputs> inputs;
@@ -90,7 +90,7 @@ class FormulaMotion final : public MotionModel {
     double sigma[CompiledFunction::kMaxElements];
     if (sigma_.Evaluate(inputs.data(), sigma) != Status::kOk) return Status::kOutOfDomain;
     const int n = noise_size(), terms = rate_ ? rate_->terms() : 1;
-    const double scale = discrete_noise() || dt_s == 0.0 ? 1.0 : 1.0 / std::sqrt(dt_s);
+    const double scale = discrete_noise() ? 1.0 : dt_s > 0.0 ? 1.0 / std::sqrt(dt_s) : 0.0;
     std::fill_n(sqrt_q, n * n, 0.0);
     for (int i = 0; i < n; ++i) {
       if (!(sigma[i / terms] >= 0.0)) return Status::kOutOfDomain;
@@ -201,12 +201,13 @@ class MotionReader {
     std::vector<Geometry> geometries = BlocksAndInput();
     const std::size_t noise = geometries.size();
     geometries.push_back(Geometry::Vector(static_cast<int>(noises_.size())));
-    geometries.push_back(Geometry::Vector(1));
+    // A rate that depends on dt would depend on the division of a step.
+    if (!is_rate) geometries.push_back(Geometry::Vector(1));
     CompiledFunction function(std::move(geometries), entry_);
     const auto declare = [&](Scope& scope) {
       DeclareBlocksAndInput(function, scope);
       DeclareSpaces(noises_, function.offset(noise), entry_, scope);
-      scope.Declare("dt", {{{function.offset(noise + 1)}}}, entry_);
+      if (!is_rate) scope.Declare("dt", {{{function.offset(noise + 1)}}}, entry_);
       keys_.AddTo(scope);
     };
     Scope scope(function.program());

@@ -101,7 +101,7 @@ void RateIntegrator::AdvanceSlope(const double* partial,
 
 Status RateIntegrator::Step(const double* const* blocks, const double* input, const double* w,
                             double dt_s, double* next, double* f, double* g) const {
-  const int n = states_, first_noise = n + inputs_, variables = rate_.program().variables();
+  const int n = states_, first_noise = n + inputs_;
   const int columns = n + noises_ * terms_;
   const bool has_jacobians = f != nullptr || g != nullptr;
   double x[kMaxSize], start[kMaxSize], rate[kMaxSize] = {}, sum[kMaxSize];
@@ -113,7 +113,6 @@ Status RateIntegrator::Step(const double* const* blocks, const double* input, co
   for (std::size_t k = 0; k < blocks_.size(); ++k)
     position = std::copy_n(blocks[k], blocks_[k].ambient, position);
   if (inputs_ > 0) std::copy_n(input, inputs_, x + n);
-  x[variables - 1] = dt_s;
   std::copy_n(start, n, sum);
   if (has_jacobians) {
     std::fill_n(total, n * columns, 0.0);

@@ -8,7 +8,7 @@
 
 namespace alidade::internal {
 
-/// Integrates dx/dt = f(x, u, w(t), dt) over one step by the Runge-Kutta method of order 4, with
+/// Integrates dx/dt = f(x, u, w(t)) over one step by the Runge-Kutta method of order 4, with
 /// the derivatives of the result.
 ///
 /// White noise of density sigma^2 is represented by its first K Legendre terms,
@@ -23,8 +23,8 @@ class RateIntegrator {
   /// Largest K.
   static constexpr int kMaxTerms = 3;
 
-  /// The inputs of `rate` are the blocks, the control input if `has_input` is true, the noise and
-  /// dt. Its outputs are the rates of the ambient elements of the blocks.
+  /// The inputs of `rate` are the blocks, the control input if `has_input` is true, and the noise.
+  /// Its outputs are the rates of the ambient elements of the blocks.
   RateIntegrator(CompiledFunction rate, const std::vector<Space>& blocks, bool has_input,
                  bool is_discrete);
 

@@ -182,6 +182,12 @@ TEST(FormulaMotion, AListOfOneElementHasItsName) {
   EXPECT_NEAR(step.next[0][0], 0.3, 1e-15);
 }
 
+TEST(FormulaMotion, ContinuousNoiseHasNoEffectInNoTime) {
+  const SharedMotion motion =
+      FormulaMotionOf("blocks: {p: number}\nnoise: {n: 0.7}\nstep: {p: p + n}\n");
+  EXPECT_EQ(Linearise(motion, {{1}}, 0.0).q(0, 0), 0.0);
+}
+
 TEST(FormulaMotion, ErrorsNameTheKey) {
   const auto error = [](const std::string& yaml) {
     return Message([&] { FormulaMotionOf(yaml); });
@@ -200,6 +206,10 @@ TEST(FormulaMotion, ErrorsNameTheKey) {
       error("blocks: {u: unit_vector}\nrate: {u: u}\n"),
       "f.yaml:2:11 rate.u: a block of geometry unit_vector has no rate; expected `step`, or a "
       "block that is a number, a vector, an angle or a unit quaternion");
+  EXPECT_EQ(error("blocks: {v: number}\nrate: {v: -v / dt}\n"),
+            "f.yaml:2:16 rate.v: the name 'dt' does not exist; expected v");
+  EXPECT_EQ(error("blocks: {v: number}\nlet: {f: 1 / dt}\nrate: {v: -v}\n"),
+            "f.yaml:2:14 let.f: the name 'dt' does not exist; expected f, v");
 }
 
 }  // namespace

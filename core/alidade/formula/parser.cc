@@ -249,8 +249,13 @@ class Parser {
     if (offset_ == unit_begin) return {{scope_.program().Constant(number)}};
     const std::string unit_text = text_.substr(unit_begin, offset_ - unit_begin);
     const auto unit = ParseUnit(unit_text);
-    if (!unit) {
+    if (!unit || unit->si.find("kg") != std::string::npos) {  // g is not the gram
       Fail(unit_begin, Quoted(unit_text) + " is not a unit",
+    const std::string first_factor = unit_text.substr(0, unit_text.find_first_of("/^"));
+    if (scope_.Contains(first_factor)) {
+      Fail(unit_begin, Quoted(first_factor) + " is the name of a quantity",
+           "an operator after the number, or another name");
+    }
            "a unit such as deg, ms or m/s^2, or an operator after the number");
     }
     return {{scope_.program().Constant(number * unit->factor)}};

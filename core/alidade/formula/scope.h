@@ -29,6 +29,7 @@ class Scope {
   void Declare(const std::string& name, Symbol symbol, const Node& node);
   /// Adds a name for an expression, which is compiled when the name is used.
   void Define(const std::string& name, const Node& expression);
+  bool Contains(const std::string& name) const { return entries_.contains(name); }
   /// Returns the symbol of a name, or null if the name does not exist. Fails if the definition of
   /// the name contains an error.
   const Symbol* Find(const std::string& name);

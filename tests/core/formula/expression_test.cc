@@ -106,6 +106,29 @@ TEST(Expression, NumbersHaveUnits) {
   ExpectValue("20ms", {0.02});
 }
 
+TEST(Expression, AUnitIsNotAName) {
+  const auto error = [](const std::string& constants) {
+    return Message([&] {
+      FormulaSensorOf("constants: {" + constants + "}\nz: {h: 0.5g * p.x}\nsigma: {h: 1}\n",
+                      {VectorSpace("p", 2)});
+    });
+  };
+  // The gram is a unit elsewhere. In a formula, g is an acceleration.
+  EXPECT_EQ(error("c: 9.81"),
+            "f.yaml:2:11 z.h: 'g' is not a unit; expected a unit such as deg, ms or m/s^2, or an "
+            "operator after the number");
+  const std::string remedy =
+      "' is the name of a quantity; expected an operator after the number, or another name";
+  EXPECT_EQ(error("g: 9.81"), "f.yaml:2:11 z.h: 'g" + remedy);
+  for (const char* unit : {"m", "m^2", "m/s^2"}) {
+    EXPECT_EQ(Message([&] {
+                FormulaSensorOf(std::string("z: {a: 3") + unit + "}\nsigma: {a: 1}\n",
+                                {NamedSpace("m", Geometry::Vector(1))});
+              }),
+              "f.yaml:1:9 z.a: 'm" + remedy);
+  }
+}
+
 TEST(Expression, ErrorsHaveTheColumnInTheFile) {
   //                           z: {range: norm(p - anchr)}
   EXPECT_EQ(ErrorOf("norm(p - anchr)"),

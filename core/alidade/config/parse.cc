@@ -185,6 +185,8 @@ class TreeBuilder : public YAML::EventHandler {
     if (ExpectsKey()) return SetKey(mark, tag, value);
     ConfigTree* node = Add(mark, anchor, Node::Kind::kScalar, value.size());
     node->quoted = tag != "?";
+    const auto first = std::min<std::size_t>(mark.pos + (node->quoted ? 1 : 0), text_.size());
+    node->is_verbatim = origin_.has_lines && text_.substr(first).starts_with(value);
     node->text = value;
   }
 

@@ -153,6 +153,7 @@ std::unique_ptr<ConfigTree> Clone(const ConfigTree& tree) {
   auto copy = std::make_unique<ConfigTree>();
   copy->kind = tree.kind;
   copy->quoted = tree.quoted;
+  copy->is_verbatim = tree.is_verbatim;
   copy->is_filled = tree.is_filled;
   copy->place = tree.place;
   copy->text = tree.text;

@@ -14,8 +14,9 @@ namespace alidade {
 /// Node of a parsed config, with its children.
 struct ConfigTree {
   Node::Kind kind = Node::Kind::kNull;
-  bool quoted = false;     ///< whether a scalar is written as 'text', "text" or a block
-  bool is_filled = false;  ///< true: the program added this value, see Node::is_filled()
+  bool quoted = false;       ///< whether a scalar is written as 'text', "text" or a block
+  bool is_verbatim = false;  ///< whether the file contains `text` as it is, in one line
+  bool is_filled = false;    ///< true: the program added this value, see Node::is_filled()
   Place place;
   std::string text;  ///< text of a scalar as it is written
   std::vector<std::unique_ptr<ConfigTree>> children;

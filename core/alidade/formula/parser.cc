@@ -50,18 +50,21 @@ class Parser {
   }
 
  private:
-  /// Fails at a place of the expression. A text of several lines has no columns in the file.
+  /// Fails at a place of the expression. The message contains the column in the file, or that in
+  /// the expression if the file contains the text in another form, such as in several lines.
   [[noreturn]] void Fail(std::size_t offset, std::string problem, const std::string& expected = {},
                          const std::string& suggestion = {}) const {
     Place place = node_.place();
-    const bool has_columns = place.line > 0 && text_.find('\n') == std::string::npos;
-    if (has_columns) {
+    if (node_.tree().is_verbatim) {
       place.column += static_cast<int>(offset) + (node_.tree().quoted ? 1 : 0);
     } else {
       const std::string_view before = std::string_view(text_).substr(0, offset);
       const std::size_t line_begin = before.rfind('\n') + 1;  // npos + 1 is 0
-      problem += ", in line " + std::to_string(1 + std::ranges::count(before, '\n')) + ", column " +
-                 std::to_string(1 + offset - line_begin) + " of the expression";
+      const bool has_lines = text_.find('\n') != std::string::npos;
+      problem += ", in ";
+      if (has_lines)
+        problem += "line " + std::to_string(1 + std::ranges::count(before, '\n')) + ", ";
+      problem += "column " + std::to_string(1 + offset - line_begin) + " of the expression";
     }
     FailAt(place, node_.path(), problem, expected, suggestion);
   }
@@ -248,14 +251,14 @@ class Parser {
     SkipUnit();
     if (offset_ == unit_begin) return {{scope_.program().Constant(number)}};
     const std::string unit_text = text_.substr(unit_begin, offset_ - unit_begin);
-    const auto unit = ParseUnit(unit_text);
-    if (!unit || unit->si.find("kg") != std::string::npos) {  // g is not the gram
-      Fail(unit_begin, Quoted(unit_text) + " is not a unit",
     const std::string first_factor = unit_text.substr(0, unit_text.find_first_of("/^"));
     if (scope_.Contains(first_factor)) {
       Fail(unit_begin, Quoted(first_factor) + " is the name of a quantity",
            "an operator after the number, or another name");
     }
+    const auto unit = ParseUnit(unit_text);
+    if (!unit || unit->si.find("kg") != std::string::npos) {  // g is not the gram
+      Fail(unit_begin, Quoted(unit_text) + " is not a unit",
            "a unit such as deg, ms or m/s^2, or an operator after the number");
     }
     return {{scope_.program().Constant(number * unit->factor)}};

@@ -174,6 +174,24 @@ TEST(Expression, ErrorsInATextOfSeveralLinesHaveItsLine) {
   EXPECT_NE(message.find("in line 2, column 3 of the expression"), std::string::npos) << message;
 }
 
+TEST(Expression, ErrorsInAFoldedTextHaveNoColumnInTheFile) {
+  const auto error = [](const std::string& expression) {
+    return Message([&] {
+      FormulaSensorOf("z:\n  a: " + expression + "\nsigma: {a: 1}\n", {VectorSpace("p", 2)});
+    });
+  };
+  const std::string expected =
+      " z.a: the name 'q' does not exist, in column 9 of the expression; "
+      "expected p, p.x, p.y; did you mean 'p'?";
+  EXPECT_EQ(error("(p.x) *\n       q"), "f.yaml:2:6" + expected);
+  EXPECT_EQ(error("'(p.x) *\n       q'"), "f.yaml:2:6" + expected);
+  EXPECT_EQ(error("\"(p.x) *\n       q\""), "f.yaml:2:6" + expected);
+  EXPECT_EQ(error("\"(p.\\x78) * q\""), "f.yaml:2:6" + expected);
+  EXPECT_EQ(
+      error("(p.x) * q"),
+      "f.yaml:2:14 z.a: the name 'q' does not exist; expected p, p.x, p.y; did you mean 'p'?");
+}
+
 TEST(Expression, RefusesWhatIsTooLong) {
   EXPECT_NE(ErrorOf("'" + std::string(2000, '(') + "'").find("nested too deep"), std::string::npos);
   EXPECT_NE(ErrorOf("'" + std::string(2000, '-') + "1'").find("nested too deep"),

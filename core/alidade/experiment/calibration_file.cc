@@ -21,7 +21,7 @@ namespace {
 enum class Lens { kBrown, kEquidistant };
 
 /// Returns the offset at which the first YAML document ends. `ros2 topic echo` ends every message
-/// with a line `---`.
+/// with a line `---`. Directives, which begin with `%`, are not content.
 std::size_t EndOfFirstDocument(std::string_view text) {
   bool has_content = false;
   for (std::size_t offset = 0; offset < text.size();) {
@@ -29,7 +29,8 @@ std::size_t EndOfFirstDocument(std::string_view text) {
     const bool is_marker = line.starts_with("---");
     if (is_marker && has_content) return offset;
     const std::size_t first = line.find_first_not_of(" \t\r");
-    has_content = has_content || (!is_marker && first != line.npos && line[first] != '#');
+    const bool is_blank = first == line.npos || line[first] == '#' || line.starts_with('%');
+    has_content = has_content || !(is_marker || is_blank);
     offset += line.size() + 1;
   }
   return text.size();

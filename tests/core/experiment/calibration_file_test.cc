@@ -128,6 +128,10 @@ TEST_F(CalibrationFileForms, Kalibr) {
   EXPECT_DOUBLE_EQ(Number(kKalibr, "k4"), 0.0002);
 }
 
+TEST_F(CalibrationFileForms, ADirectiveIsNotContent) {
+  EXPECT_DOUBLE_EQ(Number(std::string("%YAML 1.2\n---\n") + kKalibr, "cy"), 256.90);
+}
+
 TEST_F(CalibrationFileForms, Euroc) {
   EXPECT_EQ(Get(kEuroc, "model"), "radtan");
   EXPECT_EQ(Get(kEuroc, "width"), "752");

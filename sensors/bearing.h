@@ -44,16 +44,6 @@ struct DirectionToPoint
   explicit DirectionToPoint(Params& p)
       : DirectionToPoint(p.Positive("sigma_rad", "rad", "standard deviation of each angle")) {}
 
-  /// Computes h, the point in the frame of the sensor.
-  template <class T>
-  static void InSensor(const T* position, const T* attitude, const T* lever_arm, const T* mounting,
-                       const double* point, T* h) {
-    T difference[D], in_body[D];
-    for (int i = 0; i < D; ++i) difference[i] = point[i] - position[i];
-    Body<D>::RotateBack(attitude, difference, in_body);
-    for (int i = 0; i < D; ++i) in_body[i] -= lever_arm[i];
-    Body<D>::RotateBack(mounting, in_body, h);
-  }
   template <class T>
   void SqrtNoise(const T*, const T*, const T*, const T*, const double*, T* L) const {
     for (int i = 0; i < Z::kTangent; ++i) L[(Z::kTangent + 1) * i] = T(sigma_rad);
@@ -69,7 +59,7 @@ struct Bearing : DirectionToPoint<2, Angle> {
                const double* point, T* z) const {
     using std::atan2;
     T h[2];
-    InSensor(position, heading, lever_arm, mounting, point, h);
+    InSensor<2>(position, heading, lever_arm, mounting, point, h);
     if (!(h[0] * h[0] + h[1] * h[1] > T(0.0))) return false;
     z[0] = atan2(h[1], h[0]);
     return true;
@@ -86,7 +76,7 @@ struct BearingUnitVector : DirectionToPoint<3, UnitVector> {
                const double* point, T* z) const {
     using std::sqrt;
     T h[3];
-    InSensor(position, orientation, lever_arm, mounting, point, h);
+    InSensor<3>(position, orientation, lever_arm, mounting, point, h);
     const T squared = h[0] * h[0] + h[1] * h[1] + h[2] * h[2];
     if (!(squared > T(0.0))) return false;
     const T length = sqrt(squared);
@@ -108,7 +98,7 @@ struct BearingAngles : DirectionToPoint<3, Product<Angle, Angle>> {
     using std::atan2;
     using std::sqrt;
     T h[3];
-    InSensor(position, orientation, lever_arm, mounting, point, h);
+    InSensor<3>(position, orientation, lever_arm, mounting, point, h);
     const T squared = h[0] * h[0] + h[1] * h[1];
     if (!(squared > T(0.0))) return false;
     z[0] = atan2(h[1], h[0]);

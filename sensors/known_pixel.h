@@ -45,11 +45,8 @@ struct KnownPixel : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternio
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* lever_arm, const T* mounting,
                const double* point, T* pixel) const {
-    T difference[3], in_body[3], in_cam[3];
-    for (int i = 0; i < 3; ++i) difference[i] = point[i] - position[i];
-    Body<3>::RotateBack(orientation, difference, in_body);
-    for (int i = 0; i < 3; ++i) in_body[i] -= lever_arm[i];
-    Body<3>::RotateBack(mounting, in_body, in_cam);
+    T in_cam[3];
+    InSensor<3>(position, orientation, lever_arm, mounting, point, in_cam);
     return camera.Project(in_cam, pixel);
   }
   template <class T>

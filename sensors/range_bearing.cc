@@ -7,17 +7,26 @@
 namespace alidade {
 namespace {
 
-void Make(Params& p, AlidadeInstance* instance) {
-  const BoundRoles roles(p);
-  const BoundRoles::Role* const position = roles.Find("position");
-  if (position == nullptr || position->VectorSize() != 2) {
+template <int D>
+void MakeIn(Params& p, AlidadeInstance* instance) {
+  if (p.Choice("target", {"landmark", "point"}, "a landmark, or a known point", 0) == 1) {
+    EmplaceKnown<RangeBearingToPoint<D>>(p, instance);
+  } else if constexpr (D == 2) {
+    EmplaceSensor<PlanarRangeBearing>(p, instance);
+  } else {
     WithRepresentation(ReadLandmarkRepresentation(p), [&](auto representation) {
       EmplaceSensor<RangeBearing<decltype(representation)>>(p, instance);
     });
-  } else if (roles.Find("landmark") != nullptr) {
-    EmplaceSensor<PlanarRangeBearingOfLandmark>(p, instance);
+  }
+}
+
+void Make(Params& p, AlidadeInstance* instance) {
+  const BoundRoles roles(p);
+  const BoundRoles::Role* const position = roles.Find("position");
+  if (position != nullptr && position->VectorSize() == 2) {
+    MakeIn<2>(p, instance);
   } else {
-    EmplaceKnown<PlanarRangeBearingOfPoint>(p, instance);
+    MakeIn<3>(p, instance);
   }
 }
 
@@ -25,5 +34,5 @@ void Make(Params& p, AlidadeInstance* instance) {
 }  // namespace alidade
 
 ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(alidade::Make, "range_bearing",
-                                 "range and bearing of a landmark, in the plane also of a point",
+                                 "range and bearing of a landmark or of a known point",
                                  "[Thrun2005] sec. 6.6"))

@@ -17,6 +17,7 @@
 #include "alidade/config/config.h"
 #include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/short_forms.h"
+#include "alidade/model/geometry.h"
 #include "alidade/plugin/plugin_host.h"
 #include "sensor_schedule.h"
 
@@ -262,7 +263,7 @@ class Models : public Source {
       entry.Fail("the landmarks of model '" + binding.model->name() + "' of sensor '" +
                      binding.name + "' are not points, which this source draws",
                  "a landmark role that is a vector(2) or vector(3), or a position and an "
-                 "orientation");
+                 "orientation or angle");
     }
     return binding.model;
   }
@@ -274,13 +275,15 @@ class Models : public Source {
     return count == 1 && (last == Geometry::Vector(2) || last == Geometry::Vector(3));
   }
 
-  /// Returns true if the landmarks of the model consist of a position and an orientation.
+  /// Returns true if the landmarks of the model are poses, in the plane or in space.
   static bool HasPose(const SensorModel& model) {
-    const std::size_t last = model.roles().size() - 1;
-    return model.roles().size() >= 2 && model.roles()[last - 1].landmark() &&
-           model.roles()[last - 1].geometry == Geometry::Vector(3) &&
-           model.roles()[last].landmark() &&
-           model.roles()[last].geometry == Geometry::UnitQuaternion();
+    const std::size_t count = model.roles().size();
+    if (count < 2) return false;
+    const Space &position = model.roles()[count - 2], &attitude = model.roles()[count - 1];
+    return position.landmark() && attitude.landmark() &&
+           ((position.geometry == Geometry::Vector(3) &&
+             attitude.geometry == Geometry::UnitQuaternion()) ||
+            (position.geometry == Geometry::Vector(2) && attitude.geometry == Geometry::Angle()));
   }
 
   void DrawPoints(const Node& entry, std::uint64_t seed) {
@@ -397,12 +400,16 @@ class Models : public Source {
     for (const RoleBinding& role : sensor.binding->roles) {
       roles.push_back(role.block < 0 ? nullptr : x_[static_cast<std::size_t>(role.block)].data());
     }
+    double heading = 0.0;
     if (landmark >= 0) {
       const auto id = static_cast<std::size_t>(landmark);
+      const std::array<double, 4>& q = orientations_[id];
+      heading = Angle::Wrap(2.0 * std::atan2(q[3], q[0]));
       const bool has_pose = HasPose(*sensor.model);
+      const bool is_planar = sensor.model->roles().back().geometry == Geometry::Angle();
       roles.resize(sensor.model->roles().size() - (has_pose ? 2 : 1));
       roles.push_back(points_[id].data());
-      if (has_pose) roles.push_back(orientations_[id].data());
+      if (has_pose) roles.push_back(is_planar ? &heading : q.data());
     }
     const auto m = static_cast<Eigen::Index>(geometry.tangent);
     std::vector<double> z(static_cast<std::size_t>(geometry.ambient));

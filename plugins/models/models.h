@@ -35,8 +35,9 @@ inline constexpr const char* kModelsKeys =
 /// use one stream, the first of these sensors simulates it. Points are drawn uniformly in `box`;
 /// points of `landmarks.known` are drawn about their given positions. A frame contains the points
 /// that the sensor sees, at most max_per_frame. If the sensor sees more points, those with the
-/// smallest ids are used. The first time step is at `initial_time_s`, or 0. The streams are those
-/// of the sensors and inputs. The true values are those of all blocks.
+/// smallest ids are used. Headings of landmarks in the plane are uniform. The first time step is at
+/// `initial_time_s`, or 0. The streams are those of the sensors and inputs. The true values are
+/// those of all blocks.
 ///
 /// Each noise has its own random stream of the seed: 0 start, 1 points, 2 orientations of
 /// landmarks, 100 + i motion models, 1000 + 2 i sensors, 1001 + 2 i their missing measurements and

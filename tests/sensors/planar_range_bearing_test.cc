@@ -14,7 +14,7 @@ using namespace testing;
 const Blocks kPlanarRoles{{1, 2}, {M_PI / 2}, {4, 5}};
 
 TEST(PlanarRangeBearing, MeasuresALandmark) {
-  const SharedSensor sensor = MakeSensor(PlanarRangeBearingOfLandmark(0.1, 0.02), "range_bearing");
+  const SharedSensor sensor = MakeSensor(PlanarRangeBearing(0.1, 0.02), "range_bearing");
   ExpectSame(Prediction(sensor, kPlanarRoles), {std::sqrt(18.0), -M_PI / 4}, 1e-15);
   EXPECT_EQ(NoiseDiagonal(sensor, kPlanarRoles), (std::vector<double>{0.1, 0.02}));
   ExpectTrueJacobian(sensor, kPlanarRoles);
@@ -22,22 +22,8 @@ TEST(PlanarRangeBearing, MeasuresALandmark) {
 }
 
 TEST(PlanarRangeBearing, PlacesTheLandmarkAtTheMeasurement) {
-  const SharedSensor sensor = MakeSensor(PlanarRangeBearingOfLandmark(0.1, 0.02), "range_bearing");
+  const SharedSensor sensor = MakeSensor(PlanarRangeBearing(0.1, 0.02), "range_bearing");
   ExpectSame(Initialised(sensor, kPlanarRoles, {std::sqrt(18.0), -M_PI / 4}), {4, 5}, 1e-15);
-}
-
-TEST(PlanarRangeBearing, MeasuresAFixedPoint) {
-  const SharedSensor sensor = MakeSensor(
-      FixedKnown<PlanarRangeBearingOfPoint>(PlanarRangeBearingOfPoint(0.1, 0.02, 5), {4, 5}),
-      "range_bearing");
-  const Blocks roles{{1, 2}, {M_PI / 2}};
-  ExpectSame(Prediction(sensor, roles), {std::sqrt(18.0), -M_PI / 4}, 1e-15);
-  ExpectTrueJacobian(sensor, roles);
-  for (const auto& [range, status] :
-       {std::pair(5.0, Status::kOk), {5.1, Status::kInvalid}, {0.0, Status::kInvalid}}) {
-    const double z[2] = {range, 1};
-    EXPECT_EQ(sensor->Valid({z}), status);
-  }
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ using testing::SensorJacobian;
 // Position in m and orientation world_from_body.
 const Blocks kPoseRoles{{1.0, -2.0, 3.0}, {0.6, 0.0, 0.8, 0.0}};
 
-SharedSensor MakePose() { return MakeSensor(Pose({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03}), "pose"); }
+SharedSensor MakePose() { return MakeSensor(Pose<3>({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03}), "pose"); }
 
 TEST(Pose, IsPositionAndOrientation) {
   const SharedSensor pose = MakePose();

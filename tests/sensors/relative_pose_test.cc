@@ -23,7 +23,7 @@ const double kHalf = std::sqrt(0.5);
 const Blocks kRoles{{1, 2, 3}, {kHalf, 0, 0, kHalf}, {1, 6, 3.5}, {kHalf, kHalf, 0, 0}};
 
 SharedSensor MakeRelativePose() {
-  return MakeSensor(RelativePose({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03}), "relative_pose");
+  return MakeSensor(RelativePose<3>({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03}), "relative_pose");
 }
 
 TEST(RelativePose, IsThatOfTheLandmarkInTheBody) {

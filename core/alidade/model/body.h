@@ -48,6 +48,16 @@ struct Body<2> {
   static void RotateBack(const T* attitude, const T* x, T* y) {
     Turn(attitude, -1.0, x, y);
   }
+  /// Computes the attitude c = a b.
+  template <class T>
+  static void Compose(const T* a, const T* b, T* c) {
+    Angle::Plus(a, b, c);
+  }
+  /// Computes the attitude c = a^-1 b.
+  template <class T>
+  static void ComposeBack(const T* a, const T* b, T* c) {
+    Angle::Minus(b, a, c);
+  }
   /// Computes y = omega x r.
   template <class T>
   static void Cross(const T* omega, const T* r, T* y) {
@@ -104,6 +114,17 @@ struct Body<3> {
       for (int i = 0; i < 3; ++i) y[i] = x[i];
     }
   }
+  /// Computes the attitude c = a b.
+  template <class T>
+  static void Compose(const T* a, const T* b, T* c) {
+    UnitQuaternion::Multiply(a, b, c);
+  }
+  /// Computes the attitude c = a^-1 b.
+  template <class T>
+  static void ComposeBack(const T* a, const T* b, T* c) {
+    const T inverse[4] = {a[0], -a[1], -a[2], -a[3]};
+    UnitQuaternion::Multiply(inverse, b, c);
+  }
   /// Computes y = omega x r.
   template <class T>
   static void Cross(const T* omega, const T* r, T* y) {
@@ -118,5 +139,44 @@ template <int D>
 constexpr Quantity LeverArm() {
   return {"lever_arm", "m", "position of the sensor in the body", kAxes<D>, ALIDADE_ROLE_OWNED};
 }
+
+/// Computes h = B' (R' (a - p) - l), a known point a in the frame of a sensor. R and p are the
+/// attitude and the position of the body, l and B the lever arm and the mounting of the sensor.
+template <int D, class T>
+void InSensor(const T* position, const T* attitude, const T* lever_arm, const T* mounting,
+              const double* point, T* h) {
+  T difference[D], in_body[D];
+  for (int i = 0; i < D; ++i) difference[i] = point[i] - position[i];
+  Body<D>::RotateBack(attitude, difference, in_body);
+  for (int i = 0; i < D; ++i) in_body[i] -= lever_arm[i];
+  Body<D>::RotateBack(mounting, in_body, h);
+}
+
+/// Standard deviations of a pose in D dimensions: of the position, and of the attitude about each
+/// axis.
+template <int D>
+struct PoseNoise {
+  static constexpr int kAngles = Body<D>::Rotation::kTangent;
+
+  std::array<double, D> position_m;
+  std::array<double, kAngles> attitude_rad;
+
+  static PoseNoise Read(Params& p) {
+    return {p.PerAxis<D>("sigma_position_m", "m", "standard deviation of the position", kPositive),
+            p.PerAxis<kAngles>(D == 2 ? "sigma_heading_rad" : "sigma_orientation_rad", "rad",
+                               D == 2 ? "standard deviation of the heading"
+                                      : "standard deviation of the orientation about each axis",
+                               kPositive)};
+  }
+  /// Writes L, (D + kAngles) x (D + kAngles).
+  template <class T>
+  void WriteSqrtNoise(T* L) const {
+    constexpr int kNext = D + kAngles + 1;
+    for (int i = 0; i < D; ++i) L[kNext * i] = T(position_m[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < kAngles; ++i) {
+      L[kNext * (D + i)] = T(attitude_rad[static_cast<std::size_t>(i)]);
+    }
+  }
+};
 
 }  // namespace alidade

@@ -13,7 +13,7 @@ using Texts = std::vector<std::string>;
 
 TEST(InnovationSeries, HasTheUnitsOfTheParts) {
   const SensorBinding binding{
-      "mocap", "pose", MakeSensor(Pose({0.1, 0.1, 0.1}, {0.01, 0.01, 0.01}), "pose"), {}};
+      "mocap", "pose", MakeSensor(Pose<3>({0.1, 0.1, 0.1}, {0.01, 0.01, 0.01}), "pose"), {}};
   const InnovationSeries series(binding);
   EXPECT_EQ(series.units, (Texts{"m", "m", "m", "", "", "", ""}));
   EXPECT_EQ(series.z_index, (std::vector<int>{0, 1, 2, -1, -1, -1}));

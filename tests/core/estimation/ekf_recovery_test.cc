@@ -390,7 +390,7 @@ TYPED_TEST(EveryFilter, CorrectsTheBlockThatExplainsTheRejections) {
     problem.priors.push_back(prior);
   }
   problem.motions.push_back(body);
-  AddSensor(problem, "pose", MakeSensor(Pose({0.01, 0.01, 0.01}, {0.005, 0.005, 0.005}), "pose"),
+  AddSensor(problem, "pose", MakeSensor(Pose<3>({0.01, 0.01, 0.01}, {0.005, 0.005, 0.005}), "pose"),
             {"body.position", "body.orientation"});
   TypeParam filter = MakeFilter<TypeParam>(problem);
   Frame frame = FrameAt(0.0, {});

@@ -12,11 +12,17 @@
 #include "motion_models/constant.h"
 #include "motion_models/constant_acceleration.h"
 #include "motion_models/constant_velocity.h"
+#include "motion_models/coordinated_turn.h"
+#include "motion_models/gauss_markov.h"
 #include "motion_models/quaternion_pose.h"
 #include "motion_models/unicycle.h"
+#include "sensors/altitude.h"
+#include "sensors/bearing.h"
 #include "sensors/pose.h"
+#include "sensors/position.h"
 #include "sensors/pseudorange.h"
 #include "sensors/radar.h"
+#include "sensors/range.h"
 #include "sensors/range_bearing.h"
 #include "sensors/relative_pose.h"
 #include "sensors/scale_2d.h"
@@ -86,14 +92,14 @@ TEST(FormulaTwins, Scale2d) {
 }
 
 TEST(FormulaTwins, Pose) {
-  ExpectTwinSensor(MakeSensor(Pose({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03})),
+  ExpectTwinSensor(MakeSensor(Pose<3>({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03})),
                    "z: {position: position, orientation: orientation}\n"
                    "sigma: {position: [0.1, 0.2, 0.3], orientation: [0.01, 0.02, 0.03]}\n",
                    {{1, 2, 3}, {0.5, -0.5, 0.5, 0.5}});
 }
 
 TEST(FormulaTwins, RelativePose) {
-  ExpectTwinSensor(MakeSensor(RelativePose({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03})),
+  ExpectTwinSensor(MakeSensor(RelativePose<3>({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03})),
                    "z:\n  position: unrotate(orientation, landmark_position - position)\n"
                    "  orientation: multiply(conjugate(orientation), landmark_orientation)\n"
                    "sigma: {position: [0.1, 0.2, 0.3], orientation: [0.01, 0.02, 0.03]}\n",
@@ -114,6 +120,78 @@ TEST(FormulaTwins, Pseudorange) {
                    "z: {pseudorange: norm(position - transmitter) + clock_bias}\n"
                    "sigma: {pseudorange: 2.5}\n",
                    {{100, -200, 300}, {45}}, transmitter.data());
+}
+
+TEST(FormulaTwins, PlanarPose) {
+  ExpectTwinSensor(MakeSensor(Pose<2>({0.1, 0.2}, {0.03})),
+                   "z: {position: position, heading: heading}\n"
+                   "sigma: {position: [0.1, 0.2], heading: 0.03}\n",
+                   {{1, 2}, {3}});
+}
+
+TEST(FormulaTwins, PlanarRelativePose) {
+  ExpectTwinSensor(MakeSensor(RelativePose<2>({0.1, 0.2}, {0.03})), R"yaml(
+let: {d: landmark_position - position, c: cos(heading), s: sin(heading)}
+z:
+  position: [c * d.x + s * d.y, c * d.y - s * d.x]
+  heading: wrap(landmark_heading - heading)
+sigma: {position: [0.1, 0.2], heading: 0.03}
+)yaml",
+                   {{1, 2}, {3}, {-2, 5}, {-3}});
+}
+
+TEST(FormulaTwins, Position) {
+  ExpectTwinSensor(MakeSensor(Position<3>({0.1, 0.2, 0.3})),
+                   "z: {position: 'position + rotate(orientation, lever_arm)'}\n"
+                   "sigma: {position: [0.1, 0.2, 0.3]}\n",
+                   {{1, 2, 3}, {0.5, -0.5, 0.5, 0.5}, {0.3, 0.2, -0.1}});
+}
+
+TEST(FormulaTwins, Range) {
+  const std::array point = {7.0, -5.0};
+  ExpectTwinSensor(MakeSensor(RangeToPoint<2>(0.1)), R"yaml(
+known: {point: [x, y]}
+let: {l: lever_arm, c: cos(heading), s: sin(heading)}
+z: {range: "norm(position + [c * l.x - s * l.y, s * l.x + c * l.y] - point) + bias"}
+sigma: {range: 0.1}
+)yaml",
+                   {{1, 2}, {3}, {0.3, 0.2}, {0.4}}, point.data());
+}
+
+TEST(FormulaTwins, Bearing) {
+  const std::array point = {7.0, -5.0};
+  ExpectTwinSensor(MakeSensor(Bearing(0.01)), R"yaml(
+known: {point: [x, y]}
+let:
+  d: point - position
+  x: cos(heading) * d.x + sin(heading) * d.y - lever_arm.x
+  y: cos(heading) * d.y - sin(heading) * d.x - lever_arm.y
+  c: cos(mounting)
+  s: sin(mounting)
+z: {bearing: "atan2(c * y - s * x, c * x + s * y)"}
+sigma: {bearing: 0.01}
+)yaml",
+                   {{1, 2}, {3}, {0.3, 0.2}, {-0.4}}, point.data());
+}
+
+TEST(FormulaTwins, RangeBearingToPoint) {
+  const std::array point = {7.0, -5.0, 2.0};
+  ExpectTwinSensor(MakeSensor(RangeBearingToPoint<3>(0.1, 0.02)), R"yaml(
+known: {point: [x, y, z]}
+let: {h: "unrotate(mounting, unrotate(orientation, point - position) - lever_arm)"}
+z: {range: norm(h), bearing: unit(h)}
+sigma: {range: 0.1, bearing: 0.02}
+)yaml",
+                   {{1, 2, 3}, {0.5, -0.5, 0.5, 0.5}, {0.3, 0.2, -0.1}, {0.8, 0.6, 0, 0}},
+                   point.data());
+}
+
+// With 1 Pa at the height 0, rounding errors of the pressure are below the tolerance.
+TEST(FormulaTwins, Altitude) {
+  ExpectTwinSensor(MakeSensor(Altitude<3, true>(20, 1)),
+                   "z: {pressure: (1 - 2.255770e-5 * position.z) ^ 5.255880 + bias}\n"
+                   "sigma: {pressure: 20}\n",
+                   {{1, 2, 1500}, {0.25}});
 }
 
 TEST(FormulaTwins, Constant) {
@@ -142,6 +220,34 @@ TEST(FormulaTwins, ConstantAcceleration) {
                    "blocks: {p: [x, y], v: [x, y], a: [x, y]}\nnoise: {jx: 0.7, jy: 0.7}\n"
                    "rate: {p: v, v: a, a: '[jx, jy]'}\n",
                    {{1, 2}, {3, -4}, {5, 6}}, 0.4);
+}
+
+// A noise of the formula has the variance sigma^2 / dt.
+TEST(FormulaTwins, GaussMarkov) {
+  ExpectTwinMotion(MakeMotion(GaussMarkov<2>(2, 5, 0.3)), R"yaml(
+blocks: {value: [a, b]}
+noise: {wa: 0.3, wb: 0.3}
+let: {decay: exp(-dt / 5), gain: sqrt(dt * (1 - decay^2))}
+step: {value: "decay * value + gain * [wa, wb]"}
+)yaml",
+                   {{1, -2}}, 0.4);
+}
+
+TEST(FormulaTwins, CoordinatedTurn) {
+  ExpectTwinMotion(MakeMotion(CoordinatedTurn(0.5, 0.2)), R"yaml(
+blocks: {position: [x, y], heading: angle, speed: number, turn_rate: number}
+noise: {a1: 0.5, a2: 0.5, b1: 0.2, b2: 0.2}
+let:
+  s: dt * speed + dt^2 / sqrt(3) * a1
+  phi: dt * turn_rate + dt^2 / sqrt(3) * b1
+  middle: heading + 0.5 * phi
+step:
+  position: position + s * sinc(0.5 * phi) * [cos(middle), sin(middle)]
+  heading: heading + phi
+  speed: speed + 0.5 * dt * (sqrt(3) * a1 + a2)
+  turn_rate: turn_rate + 0.5 * dt * (sqrt(3) * b1 + b2)
+)yaml",
+                   {{1, 2}, {3.1}, {4}, {0.7}}, 0.4);
 }
 
 TEST(FormulaTwins, Unicycle) {

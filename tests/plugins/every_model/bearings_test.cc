@@ -24,12 +24,18 @@ INSTANTIATE_TEST_SUITE_P(
         SensorRow("bearing_landmark", "{sigma_rad: 0.01}", BearingLandmark(0.01),
                   {{0.1, -0.1}, {0.5}, {8.0, 5.0}}),
         SensorRow("range_bearing",
-                  "{roles: {position: vector(2), landmark: vector(2)}, sigma_range_m: 0.1, "
-                  "sigma_bearing_rad: 0.01}",
-                  PlanarRangeBearingOfLandmark(0.1, 0.01), {{0.1, -0.1}, {0.5}, {8.0, 5.0}}),
-        SensorRow("range_bearing",
                   "{roles: {position: vector(2)}, sigma_range_m: 0.1, sigma_bearing_rad: 0.01}",
-                  PlanarRangeBearingOfPoint(0.1, 0.01), {{0.1, -0.1}, {0.5}})),
+                  PlanarRangeBearing(0.1, 0.01), {{0.1, -0.1}, {0.5}, {8.0, 5.0}}),
+        SensorRow("range_bearing",
+                  "{roles: {position: vector(2)}, target: point, sigma_range_m: 0.1, "
+                  "sigma_bearing_rad: 0.01}",
+                  RangeBearingToPoint<2>(0.1, 0.01), {{0.1, -0.1}, {0.5}, {0.2, 0.1}, {0.1}}),
+        SensorRow("range_bearing",
+                  "{target: point, point_m: [8, 1, 0.5], sigma_range_m: 0.1, "
+                  "sigma_bearing_rad: 0.01}",
+                  FixedKnown<RangeBearingToPoint<3>>(RangeBearingToPoint<3>(0.1, 0.01),
+                                                     {8.0, 1.0, 0.5}),
+                  {kPosition, kOrientation, {0.1, 0.0, 0.05}, kOrientation})),
     RowName);
 
 }  // namespace

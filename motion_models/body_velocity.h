@@ -36,18 +36,12 @@ struct BodyVelocityMotion : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
       Quantity{"body_velocity", "m/s", "velocity in the frame of the body", "x,y,z"},
       Quantity{"angular_velocity", "rad/s", "angular velocity in the frame of the body", "x,y,z"}};
 
-  std::array<double, 3> sigma_v, sigma_omega;
+  WhiteBodyAcceleration noise;
 
   BodyVelocityMotion(const std::array<double, 3>& acceleration,
                      const std::array<double, 3>& angular_acceleration)
-      : sigma_v(acceleration), sigma_omega(angular_acceleration) {}
-  explicit BodyVelocityMotion(Params& p)
-      : BodyVelocityMotion(
-            p.PerAxis<3>("noise.linear_acceleration", "m/s^1.5",
-                         "root of the spectral density of the acceleration", kNonNegative),
-            p.PerAxis<3>("noise.angular_acceleration", "rad/s^1.5",
-                         "root of the spectral density of the angular acceleration",
-                         kNonNegative)) {}
+      : noise{acceleration, angular_acceleration} {}
+  explicit BodyVelocityMotion(Params& p) : noise(WhiteBodyAcceleration::Read(p)) {}
 
   template <class T>
   void Step(const T* r, const T* q, const T* v, const T* omega, const T* w, double dt_s, T* r1,
@@ -64,12 +58,7 @@ struct BodyVelocityMotion : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
     for (int i = 0; i < 3; ++i) r1[i] = r[i] + rotated[i];
     UnitQuaternion::Plus(q, turn, q1);
   }
-  void SqrtQ(double dt_s, MatrixRef l) const {
-    for (int i = 0; i < 3; ++i) {
-      SetWhiteAcceleration(sigma_v[static_cast<std::size_t>(i)], dt_s, i, 6 + i, l);
-      SetWhiteAcceleration(sigma_omega[static_cast<std::size_t>(i)], dt_s, 3 + i, 9 + i, l);
-    }
-  }
+  void SqrtQ(double dt_s, MatrixRef l) const { noise.SqrtQ(dt_s, l); }
 };
 
 }  // namespace alidade

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/model/model.h"
+#include "alidade/model/body.h"
+#include "alidade/model/process_noise.h"
 
 namespace alidade {
 
@@ -26,9 +27,8 @@ namespace alidade {
 /// Source       CWNA [BarShalom2001] sec. 6.2; DWNA sec. 6.3, [Ekf2017] sec. 4.1 (code).
 template <int D, bool kContinuous>
 struct ConstantVelocity : Motion<kContinuous ? 2 * D : D, Vec<D>, Vec<D>> {
-  static constexpr const char* kElements = D == 1 ? "" : D == 2 ? "x,y" : "x,y,z";
-  static constexpr std::array kBlocks{Quantity{"position", "m", "position", kElements},
-                                      Quantity{"velocity", "m/s", "velocity", kElements}};
+  static constexpr std::array kBlocks{Quantity{"position", "m", "position", kAxes<D>},
+                                      Quantity{"velocity", "m/s", "velocity", kAxes<D>}};
 
   double sigma;
 
@@ -58,12 +58,12 @@ struct ConstantVelocity : Motion<kContinuous ? 2 * D : D, Vec<D>, Vec<D>> {
     }
   }
   void SqrtQ(double dt_s, MatrixRef l) const {
-    const double root = sigma * std::sqrt(dt_s);
     for (int i = 0; i < D; ++i) {
-      l(i, i) = kContinuous ? root * dt_s / std::sqrt(3.0) : sigma;
-      if (!kContinuous) continue;
-      l(D + i, i) = root * std::sqrt(3.0) / 2.0;
-      l(D + i, D + i) = root / 2.0;
+      if (kContinuous) {
+        SetWhiteAcceleration(sigma, dt_s, i, D + i, l);
+      } else {
+        l(i, i) = sigma;
+      }
     }
   }
 };

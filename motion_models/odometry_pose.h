@@ -3,7 +3,8 @@
 
 #include <algorithm>
 
-#include "alidade/model/model.h"
+#include "alidade/model/arc.h"
+#include "alidade/model/process_noise.h"
 
 namespace alidade {
 
@@ -56,26 +57,20 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
       "linear velocity, m/s, and angular velocity, rad/s, in the frame of the vehicle",
       "vx,vy,vz,wx,wy,wz"};
 
-  NoiseKind kind;
-  std::array<double, 3> sigma_v, sigma_omega, mount;  ///< `mount` is t_0
-  std::array<double, 4> vehicle_from_cam;             ///< R_0
+  InputNoise<6> noise;
+  std::array<double, 3> mount;             ///< t_0
+  std::array<double, 4> vehicle_from_cam;  ///< R_0
 
-  OdometryPose(NoiseKind noise, const std::array<double, 3>& linear,
+  OdometryPose(NoiseKind kind, const std::array<double, 3>& linear,
                const std::array<double, 3>& angular, const std::array<double, 3>& position = {},
                const std::array<double, 4>& orientation = {1.0, 0.0, 0.0, 0.0})
-      : kind(noise),
-        sigma_v(linear),
-        sigma_omega(angular),
+      : noise{kind, {linear[0], linear[1], linear[2], angular[0], angular[1], angular[2]}},
         mount(position),
         vehicle_from_cam(orientation) {
     UnitQuaternion::Normalise(vehicle_from_cam.data());
   }
   explicit OdometryPose(Params& p)
-      : OdometryPose(p,
-                     p.Choice("noise.kind", {"continuous", "discrete"},
-                              "white noise of the velocities, or errors that are constant between "
-                              "updates",
-                              0) == 1) {}
+      : OdometryPose(p, InputNoise<6>::ReadKind(p) == NoiseKind::kDiscrete) {}
   OdometryPose(Params& p, bool is_discrete)
       : OdometryPose(
             is_discrete ? NoiseKind::kDiscrete : NoiseKind::kContinuous,
@@ -93,7 +88,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
                         {}, std::array<double, 3>{}),
             ReadVehicleFromCam(p)) {}
 
-  NoiseKind noise_kind() const { return kind; }
+  NoiseKind noise_kind() const { return noise.kind; }
   template <class T>
   void Step(const T* r, const T* q, const T* shift, const T* tilt, const T* speed_scale_error,
             const T* u, const T* w, double dt_s, T* r1, T* q1, T* shift1, T* tilt1,
@@ -106,7 +101,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     UnitQuaternion::Multiply(tilt, vehicle_from_cam.data(), mounted);
     UnitQuaternion::Exp(phi, rotation);
     UnitQuaternion::Rotate(rotation, t, rotated_t);
-    IntegrateTurn(phi, way, displacement);
+    IntegrateTurn<1>(phi, way, displacement);
     for (int i = 0; i < 3; ++i) displacement[i] += rotated_t[i] - t[i];
     UnitQuaternion::RotateBack(mounted, displacement, step);
     UnitQuaternion::RotateBack(mounted, phi, turn);
@@ -117,43 +112,9 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     std::copy(tilt, tilt + 4, tilt1);
     speed_scale_error1[0] = speed_scale_error[0];
   }
-  void SqrtQ(double dt_s, MatrixRef Lq) const {
-    double scale = 1.0;  // converts sigma to the standard deviation of the mean velocities
-    if (kind == NoiseKind::kContinuous) scale = dt_s > 0.0 ? 1.0 / std::sqrt(dt_s) : 0.0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const int k = static_cast<int>(i);
-      Lq(k, k) = scale * sigma_v[i];
-      Lq(3 + k, 3 + k) = scale * sigma_omega[i];
-    }
-  }
+  void SqrtQ(double dt_s, MatrixRef Lq) const { noise.SqrtQ(dt_s, Lq); }
 
  private:
-  /// Computes displacement = V(phi) way.
-  template <class T>
-  static void IntegrateTurn(const T* phi, const T* way, T* displacement) {
-    using std::cos;
-    using std::sin;
-    using std::sqrt;
-    const T angle2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2];
-    T a = 0.5 - angle2 / 24.0 * (1.0 - angle2 / 30.0);         // (1 - cos) / angle^2
-    T b = 1.0 / 6.0 - angle2 / 120.0 * (1.0 - angle2 / 42.0);  // (angle - sin) / angle^3
-    constexpr double kSeries = 1e-4;  // the next term of the series is below 1e-16
-    if (angle2 > T(kSeries)) {
-      const T angle = sqrt(angle2);
-      a = (1.0 - cos(angle)) / angle2;
-      b = (angle - sin(angle)) / (angle2 * angle);
-    }
-    T phi_x[3], phi_phi_x[3];
-    Cross(phi, way, phi_x);
-    Cross(phi, phi_x, phi_phi_x);
-    for (int i = 0; i < 3; ++i) displacement[i] = way[i] + a * phi_x[i] + b * phi_phi_x[i];
-  }
-  template <class T>
-  static void Cross(const T* x, const T* y, T* z) {
-    z[0] = x[1] * y[2] - x[2] * y[1];
-    z[1] = x[2] * y[0] - x[0] * y[2];
-    z[2] = x[0] * y[1] - x[1] * y[0];
-  }
   static std::array<double, 4> ReadVehicleFromCam(Params& p) {
     const char* const doc = "orientation of the camera on the vehicle: a unit quaternion";
     const std::array<double, 4> q{p.Number("vehicle_from_cam.orientation.w", "", doc, {}, 1.0),

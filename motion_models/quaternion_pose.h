@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/model/model.h"
+#include "alidade/model/process_noise.h"
 
 namespace alidade {
 
@@ -92,18 +92,12 @@ struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
 struct ContinuousQuaternionPose : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   static constexpr std::array kBlocks = QuaternionPose::kBlocks;
 
-  std::array<double, 3> sigma_a, sigma_alpha;
+  WhiteBodyAcceleration noise;
 
   ContinuousQuaternionPose(const std::array<double, 3>& acceleration,
                            const std::array<double, 3>& angular_acceleration)
-      : sigma_a(acceleration), sigma_alpha(angular_acceleration) {}
-  explicit ContinuousQuaternionPose(Params& p)
-      : ContinuousQuaternionPose(
-            p.PerAxis<3>("noise.linear_acceleration", "m/s^1.5",
-                         "root of the spectral density of the acceleration", kNonNegative),
-            p.PerAxis<3>("noise.angular_acceleration", "rad/s^1.5",
-                         "root of the spectral density of the angular acceleration",
-                         kNonNegative)) {}
+      : noise{acceleration, angular_acceleration} {}
+  explicit ContinuousQuaternionPose(Params& p) : noise(WhiteBodyAcceleration::Read(p)) {}
 
   template <class T>
   void Step(const T* r, const T* q, const T* v, const T* omega, const T* w, double dt_s, T* r1,
@@ -119,59 +113,26 @@ struct ContinuousQuaternionPose : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec
   }
   void StepJacobian(const double*, const double*, const double*, const double* omega,
                     const double* w, double dt_s, MatrixRef f, MatrixRef g) const {
-    double phi[3], minus_phi[3], rotation[4];
+    double phi[3], minus_phi[3], rotation[4], j[9];
     for (int i = 0; i < 3; ++i) phi[i] = dt_s * omega[i] + w[3 + i];
     for (int i = 0; i < 3; ++i) minus_phi[i] = -phi[i];
     UnitQuaternion::Exp(minus_phi, rotation);
+    Rotation::RightJacobian(phi, j);
     for (int c = 0; c < 3; ++c) {
       f(c, c) = f(6 + c, 6 + c) = f(9 + c, 9 + c) = 1.0;
       g(c, c) = g(6 + c, 6 + c) = g(9 + c, 9 + c) = 1.0;
       f(c, 6 + c) = dt_s;
       const double axis[3] = {c == 0 ? 1.0 : 0.0, c == 1 ? 1.0 : 0.0, c == 2 ? 1.0 : 0.0};
-      double rotated_axis[3], j_axis[3];
+      double rotated_axis[3];
       UnitQuaternion::Rotate(rotation, axis, rotated_axis);
-      MultiplyByRightJacobian(phi, axis, j_axis);
       for (int i = 0; i < 3; ++i) {
         f(3 + i, 3 + c) = rotated_axis[i];
-        f(3 + i, 9 + c) = dt_s * j_axis[i];
-        g(3 + i, 3 + c) = j_axis[i];
+        f(3 + i, 9 + c) = dt_s * j[3 * i + c];
+        g(3 + i, 3 + c) = j[3 * i + c];
       }
     }
   }
-  void SqrtQ(double dt_s, MatrixRef Lq) const {
-    const double root = std::sqrt(dt_s);
-    for (std::size_t i = 0; i < 6; ++i) {
-      const int k = static_cast<int>(i);
-      const double sigma = root * (i < 3 ? sigma_a[i] : sigma_alpha[i - 3]);
-      Lq(k, k) = sigma * dt_s / std::sqrt(3.0);
-      Lq(6 + k, k) = sigma * std::sqrt(3.0) / 2.0;
-      Lq(6 + k, 6 + k) = sigma / 2.0;
-    }
-  }
-
- private:
-  /// Computes product = J(phi) x.
-  static void MultiplyByRightJacobian(const double* phi, const double* x, double* product) {
-    constexpr double kSeries =
-        1e-4;  // squared angle below which the next term of the series is below 1e-16
-    const double angle2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2];
-    double a = 0.5 - angle2 / 24.0 * (1.0 - angle2 / 30.0);
-    double b = 1.0 / 6.0 - angle2 / 120.0 * (1.0 - angle2 / 42.0);
-    if (angle2 > kSeries) {
-      const double angle = std::sqrt(angle2);
-      a = (1.0 - std::cos(angle)) / angle2;
-      b = (angle - std::sin(angle)) / (angle2 * angle);
-    }
-    double phi_x[3], phi_phi_x[3];
-    Cross(phi, x, phi_x);
-    Cross(phi, phi_x, phi_phi_x);
-    for (int i = 0; i < 3; ++i) product[i] = x[i] - a * phi_x[i] + b * phi_phi_x[i];
-  }
-  static void Cross(const double* x, const double* y, double* z) {
-    z[0] = x[1] * y[2] - x[2] * y[1];
-    z[1] = x[2] * y[0] - x[0] * y[2];
-    z[2] = x[0] * y[1] - x[1] * y[0];
-  }
+  void SqrtQ(double dt_s, MatrixRef Lq) const { noise.SqrtQ(dt_s, Lq); }
 };
 
 }  // namespace alidade

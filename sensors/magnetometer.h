@@ -25,7 +25,7 @@ namespace alidade {
 ///
 /// Defined everywhere.
 /// Source       [Groves2013] sec. 6.1.1.
-struct Magnetometer : Sensor<Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion> {
+struct Magnetometer : WorldVectorSensor {
   static constexpr std::array kRoles{
       Body<3>::Attitude(),
       Quantity{"hard_iron", "uT", "field of the body itself", "x,y,z", ALIDADE_ROLE_OWNED},
@@ -33,10 +33,8 @@ struct Magnetometer : Sensor<Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion> {
   static constexpr Quantity kMeasurement{"magnetic_field", "uT",
                                          "magnetic field in the frame of the sensor", "x,y,z"};
 
-  std::array<double, 3> sigma_ut, field_ut;
-
-  Magnetometer(const std::array<double, 3>& sigma, const std::array<double, 3>& field)
-      : sigma_ut(sigma), field_ut(field) {}
+  Magnetometer(const std::array<double, 3>& sigma_ut, const std::array<double, 3>& field_ut)
+      : WorldVectorSensor(sigma_ut, field_ut) {}
   explicit Magnetometer(Params& p)
       : Magnetometer(p.PerAxis<3>("sigma_ut", "uT", "standard deviation of the field", kPositive),
                      ReadField(p)) {}
@@ -47,20 +45,6 @@ struct Magnetometer : Sensor<Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion> {
     const double horizontal = strength_ut * std::cos(inclination_rad);
     return {horizontal * std::sin(declination_rad), horizontal * std::cos(declination_rad),
             -strength_ut * std::sin(inclination_rad)};
-  }
-
-  template <class T>
-  bool Predict(const T* orientation, const T* hard_iron, const T* mounting, T* z) const {
-    const T field[3] = {T(field_ut[0]), T(field_ut[1]), T(field_ut[2])};
-    T in_body[3];
-    Body<3>::RotateBack(orientation, field, in_body);
-    Body<3>::RotateBack(mounting, in_body, z);
-    for (int i = 0; i < 3; ++i) z[i] += hard_iron[i];
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, const T*, const T*, T* L) const {
-    for (int i = 0; i < 3; ++i) L[4 * i] = T(sigma_ut[static_cast<std::size_t>(i)]);
   }
 
  private:

@@ -27,7 +27,7 @@ namespace alidade {
 /// Defined everywhere.
 /// Valid for    | |z| - |g| | <= e_max. Other measurements are invalid: the body accelerates.
 /// Source       [Groves2013] sec. 5.6.1 (leveling).
-struct SpecificForce : Sensor<Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion> {
+struct SpecificForce : WorldVectorSensor {
   static constexpr std::array kRoles{
       Body<3>::Attitude(),
       Quantity{"bias", "m/s^2", "bias of the accelerometer", "x,y,z", ALIDADE_ROLE_OWNED},
@@ -35,13 +35,13 @@ struct SpecificForce : Sensor<Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion> {
   static constexpr Quantity kMeasurement{"specific_force", "m/s^2",
                                          "specific force in the frame of the sensor", "x,y,z"};
 
-  std::array<double, 3> sigma_m_s2, gravity_m_s2;
   double max_acceleration_m_s2;
 
-  explicit SpecificForce(const std::array<double, 3>& sigma,
-                         const std::array<double, 3>& gravity = {0.0, 0.0, -9.80665},
+  explicit SpecificForce(const std::array<double, 3>& sigma_m_s2,
+                         const std::array<double, 3>& gravity_m_s2 = {0.0, 0.0, -9.80665},
                          double max_acceleration = std::numeric_limits<double>::infinity())
-      : sigma_m_s2(sigma), gravity_m_s2(gravity), max_acceleration_m_s2(max_acceleration) {}
+      : WorldVectorSensor(sigma_m_s2, {-gravity_m_s2[0], -gravity_m_s2[1], -gravity_m_s2[2]}),
+        max_acceleration_m_s2(max_acceleration) {}
   explicit SpecificForce(Params& p)
       : SpecificForce(
             p.PerAxis<3>("sigma_m_s2", "m/s^2", "standard deviation of the specific force",
@@ -52,24 +52,11 @@ struct SpecificForce : Sensor<Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion> {
                            "largest valid difference of the lengths of z and gravity", kPositive)
                 .value_or(std::numeric_limits<double>::infinity())) {}
 
-  template <class T>
-  bool Predict(const T* orientation, const T* bias, const T* mounting, T* z) const {
-    const T reaction[3] = {T(-gravity_m_s2[0]), T(-gravity_m_s2[1]), T(-gravity_m_s2[2])};
-    T in_body[3];
-    Body<3>::RotateBack(orientation, reaction, in_body);
-    Body<3>::RotateBack(mounting, in_body, z);
-    for (int i = 0; i < 3; ++i) z[i] += bias[i];
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, const T*, const T*, T* L) const {
-    for (int i = 0; i < 3; ++i) L[4 * i] = T(sigma_m_s2[static_cast<std::size_t>(i)]);
-  }
   bool Valid(const double* z) const {
-    const auto& g = gravity_m_s2;
-    const double length = std::sqrt(z[0] * z[0] + z[1] * z[1] + z[2] * z[2]);
-    return std::abs(length - std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])) <=
-           max_acceleration_m_s2;
+    const auto length = [](const double* x) {
+      return std::sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
+    };
+    return std::abs(length(z) - length(vector_in_world.data())) <= max_acceleration_m_s2;
   }
 };
 

@@ -9,38 +9,6 @@
 /// space.
 namespace alidade {
 
-/// Returns the Stumpff function
-///
-///   c_N(x^2) = 1/N! - x^2/(N+2)! + x^4/(N+4)! - ...
-///
-/// so that c_0 = cos x, c_1 = sin x / x, c_N = (1/(N-2)! - c_(N-2)) / x^2. Accurate to rounding
-/// errors for every x^2 >= 0.
-template <int N, class T>
-T Stumpff(const T& x2) {
-  using std::cos;
-  using std::sin;
-  using std::sqrt;
-  constexpr auto factorial = [](int n) {
-    double product = 1.0;
-    for (int i = 2; i <= n; ++i) product *= i;
-    return product;
-  };
-  if (x2 < T(1.0)) {
-    constexpr int kTerms = 9;  // the next term is below 1e-17
-    T sum(1.0);
-    for (int k = N + 2 * kTerms; k > N; k -= 2) sum = 1.0 - x2 * sum / double((k - 1) * k);
-    return sum / factorial(N);
-  }
-  if constexpr (N == 0) {
-    return cos(sqrt(x2));
-  } else if constexpr (N == 1) {
-    const T x = sqrt(x2);
-    return sin(x) / x;
-  } else {
-    return (1.0 / factorial(N - 2) - Stumpff<N - 2>(x2)) / x2;
-  }
-}
-
 /// Computes the pose in the plane after a displacement of which each part turns with the body:
 ///
 ///   r' = r + c_1(phi^2/4) R(h + phi/2) d,   h' = h + phi
@@ -52,7 +20,7 @@ void MoveAlongArc(const T* position, const T* heading, const T* displacement, co
                   T* next_position, T* next_heading) {
   using std::cos;
   using std::sin;
-  const T chord = Stumpff<1>(T(0.25 * turn * turn)), direction = heading[0] + 0.5 * turn;
+  const T chord = StumpffFunctions<T>(0.25 * turn * turn).c1, direction = heading[0] + 0.5 * turn;
   const T c = chord * cos(direction), s = chord * sin(direction);
   const T x = c * displacement[0] - s * displacement[1],
           y = s * displacement[0] + c * displacement[1];
@@ -64,7 +32,7 @@ void MoveAlongArc(const T* position, const T* heading, const T* displacement, co
 /// Computes y = Gamma_M(phi) x, the M-fold integral of a vector that turns with a body, as seen
 /// from the body before the turn:
 ///
-///   Gamma_M(phi) = I/M! + c_(M+1)(|phi|^2) [phi]x + c_(M+2)(|phi|^2) [phi]x^2
+///   Gamma_M(phi) = I/M! + c_(M+1) [phi]x + c_(M+2) [phi]x^2,   c_n = c_n(|phi|^2)
 ///
 /// Gamma_0 = Exp(phi). Gamma_1 is the left Jacobian of SO(3): Gamma_1(omega t) v t is the
 /// displacement of a body with the velocities v and omega in its own frame. Gamma_2(omega t) a t^2
@@ -78,7 +46,8 @@ void IntegrateTurn(const T* turn, const T* x, T* y) {
     c[2] = turn[0] * b[1] - turn[1] * b[0];
   };
   const T angle2 = turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2];
-  const T a = Stumpff<M + 1>(angle2), b = Stumpff<M + 2>(angle2);
+  const StumpffFunctions<T> s(angle2);
+  const T a = M == 0 ? s.c1 : M == 1 ? s.c2 : s.c3, b = M == 0 ? s.c2 : M == 1 ? s.c3 : s.c4;
   constexpr double kFirst = M == 2 ? 0.5 : 1.0;
   static_assert(M >= 0 && M <= 2, "higher integrals need another first coefficient");
   T once[3], twice[3];

@@ -152,6 +152,34 @@ void InSensor(const T* position, const T* attitude, const T* lever_arm, const T*
   Body<D>::RotateBack(mounting, in_body, h);
 }
 
+/// Base of a sensor that measures a constant vector of the world, such as a field:
+///
+///   z = B' R' m + b + n,   n ~ N(0, diag(sigma^2))
+///
+/// R is the orientation of the body, B the mounting and b the bias of the sensor, m the vector.
+struct WorldVectorSensor : Sensor<Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion> {
+  std::array<double, 3> sigma, vector_in_world;
+
+  WorldVectorSensor(const std::array<double, 3>& deviation, const std::array<double, 3>& vector)
+      : sigma(deviation), vector_in_world(vector) {}
+
+  /// Computes z without noise.
+  template <class T>
+  bool Predict(const T* orientation, const T* bias, const T* mounting, T* z) const {
+    const T vector[3] = {T(vector_in_world[0]), T(vector_in_world[1]), T(vector_in_world[2])};
+    T in_body[3];
+    Body<3>::RotateBack(orientation, vector, in_body);
+    Body<3>::RotateBack(mounting, in_body, z);
+    for (int i = 0; i < 3; ++i) z[i] += bias[i];
+    return true;
+  }
+  /// Computes L = diag(sigma).
+  template <class T>
+  void SqrtNoise(const T*, const T*, const T*, T* L) const {
+    for (int i = 0; i < 3; ++i) L[4 * i] = T(sigma[static_cast<std::size_t>(i)]);
+  }
+};
+
 /// Standard deviations of a pose in D dimensions: of the position, and of the attitude about each
 /// axis.
 template <int D>
@@ -161,6 +189,7 @@ struct PoseNoise {
   std::array<double, D> position_m;
   std::array<double, kAngles> attitude_rad;
 
+  /// Reads `sigma_position_m`, and `sigma_heading_rad` or `sigma_orientation_rad`.
   static PoseNoise Read(Params& p) {
     return {p.PerAxis<D>("sigma_position_m", "m", "standard deviation of the position", kPositive),
             p.PerAxis<kAngles>(D == 2 ? "sigma_heading_rad" : "sigma_orientation_rad", "rad",

@@ -23,6 +23,29 @@ inline void SetWhiteAcceleration(double sigma, double dt_s, int position, int ve
   l(velocity, velocity) = root / 2.0;
 }
 
+/// White linear and angular acceleration of a body in space. For each axis, the noise of a position
+/// and its velocity has the form of SetWhiteAcceleration.
+struct WhiteBodyAcceleration {
+  std::array<double, 3> linear;   ///< root of the spectral density for each axis, m/s^1.5
+  std::array<double, 3> angular;  ///< root of the spectral density for each axis, rad/s^1.5
+
+  /// Reads `noise.linear_acceleration` and `noise.angular_acceleration`.
+  static WhiteBodyAcceleration Read(Params& p) {
+    return {p.PerAxis<3>("noise.linear_acceleration", "m/s^1.5",
+                         "root of the spectral density of the acceleration", kNonNegative),
+            p.PerAxis<3>("noise.angular_acceleration", "rad/s^1.5",
+                         "root of the spectral density of the angular acceleration", kNonNegative)};
+  }
+  /// Writes the factor of the covariance, 12 x 12, of the noise of the position, orientation,
+  /// velocity and angular velocity.
+  void SqrtQ(double dt_s, MatrixRef l) const {
+    for (int i = 0; i < 3; ++i) {
+      SetWhiteAcceleration(linear[static_cast<std::size_t>(i)], dt_s, i, 6 + i, l);
+      SetWhiteAcceleration(angular[static_cast<std::size_t>(i)], dt_s, 3 + i, 9 + i, l);
+    }
+  }
+};
+
 /// Noise of N control inputs that are constant over dt.
 ///
 ///   continuous  w ~ N(0, diag(sigma^2) / dt): the mean over dt of white noise. sigma is the root

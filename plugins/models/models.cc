@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -17,6 +18,7 @@
 #include "alidade/config/config.h"
 #include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/short_forms.h"
+#include "alidade/formula/formula_name.h"
 #include "alidade/model/geometry.h"
 #include "alidade/plugin/plugin_host.h"
 #include "sensor_schedule.h"
@@ -98,12 +100,26 @@ class Models : public Source {
     Config truth = overrides ? arguments.config->Merged(*overrides) : arguments.config->Copy();
     ExpandShortForms(truth, *arguments.host);
     problem_ = ReadProblem(truth.root(), *arguments.host, {});
+    AddXyzModels(truth, *arguments.host);
     start_s_ = problem_.initial_time_s.value_or(0.0);
     if (!overrides) return;
     for (const auto& [key, node] : overrides->Entries()) {
       if (!truth.root().HasUnread(key)) continue;
       node.Fail("the simulator does not read the key '" + key + "'",
                 "'state', 'sensors', or a key that their models read");
+    }
+  }
+
+  /// Adds models with landmarks in the representation xyz, for sensors that define their own
+  /// representation of points.
+  void AddXyzModels(const Config& truth, const PluginHost& host) {
+    for (const SensorBinding& sensor : problem_.sensors) {
+      const SensorModel& model = *sensor.model;
+      const bool has_equations = internal::HasEquationsInConfig(model.name());
+      if (!model.has_landmark() || has_equations || sensor.xyz != nullptr) continue;
+      if (HasPoint(model) || HasPose(model)) continue;
+      xyz_[sensor.name] =
+          host.CreateSensor(model.name(), truth.root().At("sensors").At(sensor.name), "xyz");
     }
   }
 
@@ -255,17 +271,19 @@ class Models : public Source {
   }
 
   /// Returns a model of the sensor whose landmarks are points or poses.
-  static SharedSensor ModelOf(const Node& entry, const SensorBinding& binding) {
+  SharedSensor ModelOf(const Node& entry, const SensorBinding& binding) const {
     if (!binding.model->has_landmark()) return binding.model;
     entry.At("landmarks", "sensor '" + binding.name + "'");
     if (binding.xyz) return binding.xyz;
-    if (!HasPose(*binding.model) && !HasPoint(*binding.model)) {
+    const auto xyz = xyz_.find(binding.name);
+    const SharedSensor& model = xyz != xyz_.end() ? xyz->second : binding.model;
+    if (!HasPose(*model) && !HasPoint(*model)) {
       entry.Fail("the landmarks of model '" + binding.model->name() + "' of sensor '" +
                      binding.name + "' are not points, which this source draws",
                  "a landmark role that is a vector(2) or vector(3), or a position and an "
                  "orientation or angle");
     }
-    return binding.model;
+    return model;
   }
 
   /// Returns true if a landmark of the model is a point in the plane or in space.
@@ -449,6 +467,7 @@ class Models : public Source {
   }
 
   Problem problem_;
+  std::map<std::string, SharedSensor> xyz_;  ///< by sensor: see AddXyzModels
   std::vector<StreamInfo> streams_, truths_;
   std::vector<std::vector<double>> x_;  ///< true value of each block
   std::vector<Motion> motions_;

@@ -18,8 +18,8 @@ INSTANTIATE_TEST_SUITE_P(
                   {kPosition, kOrientation, {0.1, 0.0, 0.05}, {0.6, 0.0, 0.8, 0.0}}),
         SensorRow("bearing",
                   "{roles: {position: vector(3)}, measures: angles, point_m: [8, 1, 0.5], "
-                  "sigma_rad: 0.03}",
-                  FixedKnown<BearingAngles>(BearingAngles(0.03), {8.0, 1.0, 0.5}),
+                  "sigma_rad: 0.01}",
+                  FixedKnown<BearingAngles>(BearingAngles(0.01), {8.0, 1.0, 0.5}),
                   {kPosition, kOrientation, {0.1, 0.0, 0.05}, kOrientation}),
         SensorRow("bearing_landmark", "{sigma_rad: 0.01, landmarks: {representation: xyz}}",
                   BearingLandmark<PlanarXyz>(0.01), {{0.1, -0.1}, {0.5}, {8.0, 5.0}}),

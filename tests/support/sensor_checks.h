@@ -80,6 +80,8 @@ inline std::vector<double> Elements(const Eigen::VectorXd& x) {
 inline const std::vector<double> kAttitude{0.7, 0.1, -0.1, 0.7};
 inline const std::vector<double> kNeutral{1.0, 0.0, 0.0, 0.0};
 inline const double kRoot = std::sqrt(0.5);
+/// Rotates x to y, y to z and z to x. All of its operations are exact.
+inline const std::vector<double> kCyclicTurn{0.5, 0.5, 0.5, 0.5};
 /// Rotates x to y, and y to -x: 90 degrees about z.
 inline const std::vector<double> kQuarterTurn{kRoot, 0.0, 0.0, kRoot};
 

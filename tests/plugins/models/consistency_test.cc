@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -137,21 +138,31 @@ class Tally : public RunObserver {
   void AddPlanarLandmarks(const State& state, Sums& sums) const {
     std::vector<Block> planar = state.layout().blocks();
     std::erase_if(planar, [](const Block& block) {
-      return block.owner != "landmarks" || !(block.geometry() == Geometry::Vector(2));
+      return block.owner != "landmarks" ||
+             !(block.geometry() == Geometry::Vector(2) || block.geometry() == Geometry::Vector(4));
     });
     if (planar.empty()) return;
     AddPlanarLandmark(state, planar.front(), sums[kFirstLandmark]);
     AddPlanarLandmark(state, planar.back(), sums[kLastLandmark]);
   }
-  /// Adds a landmark, whose block has the name `landmarks.ID.ROLE`.
+  /// Adds a landmark, whose block has the name `landmarks.ID.ROLE`. The block contains the point m,
+  /// or (a, theta, rho) with m = a + (cos theta, sin theta) / rho.
   void AddPlanarLandmark(const State& state, const Block& block, ChiSquare& nees) const {
     const auto place =
         experiment_->source->TrueLandmark(std::stoll(block.name.substr(block.owner.size() + 1)));
     ASSERT_TRUE(place);
-    const double* const estimate = state.value(state.layout().Find(block.name));
-    const int row = block.tangent_offset;
-    Add(state.covariance().Dense().block(row, row, 2, 2),
-        Eigen::Vector2d::Map(place->data()) - Eigen::Vector2d::Map(estimate), nees);
+    const double* const y = state.value(state.layout().Find(block.name));
+    const int n = block.geometry().tangent, row = block.tangent_offset;
+    Eigen::Vector2d point(y[0], y[1]);
+    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Identity(2, n);
+    if (n == 4) {
+      const Eigen::Vector2d ray = Eigen::Vector2d(std::cos(y[2]), std::sin(y[2])) / y[3];
+      point += ray;
+      jacobian.col(2) << -ray[1], ray[0];
+      jacobian.col(3) = -ray / y[3];
+    }
+    Add(jacobian * state.covariance().Dense().block(row, row, n, n) * jacobian.transpose(),
+        Eigen::Vector2d::Map(place->data()) - point, nees);
   }
   static void Add(const Eigen::MatrixXd& p, const Eigen::VectorXd& error, ChiSquare& nees) {
     const double square = internal::SquaredMahalanobis(p, error);

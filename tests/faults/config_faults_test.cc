@@ -50,6 +50,11 @@ const std::string kEkf = "{type: ekf}", kDepthSource = "{type: depth_target, see
 std::string Rows(const std::string& keys) {
   return "{type: tables, path: rows.csv, streams: {disparity: d, inverse_scale: s}, " + keys + "}";
 }
+/// Returns a source that reads the same table as one of a list of files.
+std::string InFiles(const std::string& keys) {
+  return "{type: tables, files: [{path: rows.csv, streams: {disparity: d, inverse_scale: s}, " +
+         keys + "}]}";
+}
 
 const Fault kTextFaults[] = {
     MakeFault("01_duplicate_key", "depth", {After("focal_px: 400", "    focal_px: 401")}, 20,
@@ -108,6 +113,11 @@ const Fault kKeyFaults[] = {
               "source.truth.detph: the truth does not match a block: no block has this name; "
               "expected the name "
               "and size of one block, as in ENTRY.BLOCK; did you mean 'depth'?"),
+    MakeFault("02_truth_of_no_block_in_a_file", "depth",
+              {{kDepthSource, InFiles("truth: {depth_rate: s,\n  detph: d}")}}, 29,
+              "source.files[0].truth.detph: the truth does not match a block: no block has this "
+              "name; expected the name and size of one block, as in ENTRY.BLOCK; did you mean "
+              "'depth'?"),
     MakeFault("02_truth_sigma_of_no_truth", "depth",
               {After(kEkf, "evaluate: {truth_sigma: {dept: 0.01}}")}, 31,
               "evaluate.truth_sigma.dept: the source has no truth 'dept'; expected a truth of the "
@@ -270,6 +280,10 @@ const Fault kBlockFaults[] = {
               {{kDepthSource, Rows("truth: {depth_rate: s,\n  target.depth: [d, s]}")}}, 29,
               "source.truth.target.depth: the truth does not match a block: target.depth has size "
               "1, but the truth has size 2"),
+    MakeFault("44_truth_of_another_size_in_a_file", "depth",
+              {{kDepthSource, InFiles("truth: {depth_rate: s,\n  target.depth: [d, s]}")}}, 29,
+              "source.files[0].truth.target.depth: the truth does not match a block: target.depth "
+              "has size 1, but the truth has size 2"),
 };
 
 const Fault kEstimatorFaults[] = {

@@ -64,27 +64,44 @@ std::vector<Segment> ReadSegments(const Node& root, const Problem& problem,
   return segments;
 }
 
+/// Returns the maps of true values in the config: that of the source and those of its files.
+std::vector<Node> TruthMaps(const Node& source) {
+  std::vector<Node> entries = {source};
+  if (const auto files = source.Find("files")) {
+    for (const Node& file : files->ItemsOrOne()) entries.push_back(file);
+  }
+  std::vector<Node> maps;
+  for (const Node& entry : entries) {
+    const auto map = entry.is_map() ? entry.Find("truth") : std::nullopt;
+    if (map && map->is_map()) maps.push_back(*map);
+  }
+  return maps;
+}
+
 /// Rejects a truth in the config that does not match any block of `full_problem` or of an
 /// estimator. `full_problem` contains all sensors.
 void CheckTruths(const Node& source, const Experiment& experiment, const Problem& full_problem) {
-  const auto listed = source.Find("truth");
-  if (!listed || !listed->is_map()) return;
   const std::vector<StreamInfo>& truths = experiment.source->truths();
-  for (std::size_t t = 0; t < truths.size(); ++t) {
-    const auto node = listed->Find(truths[t].name);
+  const auto check = [&](const std::string& name, const Node& node) {
+    const auto truth = std::ranges::find(truths, name, &StreamInfo::name);
+    const auto t = static_cast<std::size_t>(truth - truths.begin());
     const auto has_block = [&](const EstimatorSpec& estimator) {
       return internal::WhyNoBlock(estimator.problem.layout, truths, t).empty();
     };
+    if (truth == truths.end() || std::ranges::any_of(experiment.estimators, has_block)) return;
     const std::string reason = internal::WhyNoBlock(full_problem.layout, truths, t);
-    if (!node || reason.empty() || std::ranges::any_of(experiment.estimators, has_block)) continue;
+    if (reason.empty()) return;
     std::vector<std::string> names;
     for (const Block& block : full_problem.layout.blocks()) {
       names.push_back(block.name);
       names.push_back(block.name.substr(block.owner.size() + 1));
     }
-    std::erase(names, truths[t].name);
-    node->Fail("the truth does not match a block: " + reason,
-               "the name and size of one block, as in ENTRY.BLOCK", Nearest(truths[t].name, names));
+    std::erase(names, name);
+    node.Fail("the truth does not match a block: " + reason,
+              "the name and size of one block, as in ENTRY.BLOCK", Nearest(name, names));
+  };
+  for (const Node& map : TruthMaps(source)) {
+    for (const auto& [name, node] : map.Entries()) check(name, node);
   }
 }
 

@@ -58,27 +58,17 @@ double ReadGain(const Node& node) {
   return gain;
 }
 
-/// Reads a number in SI units, or a number with a unit, such as `90deg`.
-double ReadOffset(const Node& node) {
+/// Reads a number in `unit`, or a number with its own unit, such as `90deg`.
+double ReadOffset(const Node& node, double unit) {
   const auto quantity = internal::ParseQuantity(node.Text());
-  return quantity ? quantity->value * quantity->unit.factor : node.Number();
+  return quantity ? quantity->value * quantity->unit.factor : node.Number() * unit;
 }
 
-void ReadConversions(const Node& node, TableField& field) {
-  field.conversions.resize(field.columns.size());
-  ReadForEachColumn(node, "unit", field, [](auto& c, const Node& n) { c.unit = ReadUnit(n); });
-  ReadForEachColumn(node, "gain", field, [](auto& c, const Node& n) { c.gain = ReadGain(n); });
-  ReadForEachColumn(node, "offset", field,
-                    [](auto& c, const Node& n) { c.offset = ReadOffset(n); });
-  if (const auto reciprocal = node.Find("reciprocal")) field.reciprocal = reciprocal->Flag();
-}
-
-/// Reads the conversions of a field. The columns of a geodetic position are in deg, deg and m,
-/// unless `unit` is given.
-void ReadGeodeticAndConversions(const Node& node, TableField& field) {
+/// Reads `geodetic`. The columns of a geodetic position are in deg, deg and m, unless `unit` is
+/// given.
+void ReadGeodetic(const Node& node, TableField& field) {
   const std::optional<Node> geodetic = node.Find("geodetic");
   field.geodetic = geodetic && geodetic->Flag();
-  ReadConversions(node, field);
   if (!field.geodetic) return;
   const std::size_t count = field.columns.size();
   if (count < 2 || count > 3 || field.reciprocal) {
@@ -86,9 +76,20 @@ void ReadGeodeticAndConversions(const Node& node, TableField& field) {
                        (field.reciprocal ? " of reciprocals" : ""),
                    "columns: latitude, longitude and perhaps height");
   }
-  if (node.Find("unit")) return;
   const double degree = *DataUnitFactor("deg");
   for (std::size_t i = 0; i < 2; ++i) field.conversions[i].unit = degree;
+}
+
+/// Reads the conversions of the columns. The offset of a reciprocal is in SI units.
+void ReadConversions(const Node& node, TableField& field) {
+  field.conversions.resize(field.columns.size());
+  if (const auto reciprocal = node.Find("reciprocal")) field.reciprocal = reciprocal->Flag();
+  ReadGeodetic(node, field);
+  ReadForEachColumn(node, "unit", field, [](auto& c, const Node& n) { c.unit = ReadUnit(n); });
+  ReadForEachColumn(node, "gain", field, [](auto& c, const Node& n) { c.gain = ReadGain(n); });
+  ReadForEachColumn(node, "offset", field, [&](auto& c, const Node& n) {
+    c.offset = ReadOffset(n, field.reciprocal ? 1.0 : c.unit);
+  });
 }
 
 std::vector<RowCondition> ReadConditions(const Node& node) {
@@ -188,7 +189,7 @@ void ReadFieldMap(const std::string& name, const Node& node, bool is_stream, Tab
     field.columns = ReadColumns(node.At("columns", name));
   }
   field.info.size = static_cast<int>(constant ? field.constant.size() : field.columns.size());
-  if (!constant) ReadGeodeticAndConversions(node, field);
+  if (!constant) ReadConversions(node, field);
   if (const auto rows = node.Find("rows")) field.conditions = ReadConditions(*rows);
   if (const auto valid = node.Find("valid")) field.valid = ReadColumn(*valid);
   if (is_stream) ReadStreamKeys(node, field);

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "alidade/base/number_text.h"
 #include "field_values.h"
 #include "known_table.h"
 #include "local_frame.h"
@@ -158,6 +159,7 @@ class TablesSource : public Source {
       if (first == nullptr || reader.timestamp() < first->timestamp()) first = &reader;
     }
     if (first == nullptr) return false;
+    if (!std::exchange(has_rows_, true)) CheckFirstTimes(*first);
     const Timestamp timestamp = first->timestamp();
     for (const Table& table : tables_) {
       TableReader& reader = *table.reader;
@@ -168,6 +170,25 @@ class TablesSource : public Source {
       }
     }
     return true;
+  }
+
+  /// Rejects tables whose first times are so far apart that their units or origins must differ.
+  /// `first` is the table with the earliest time.
+  void CheckFirstTimes(const TableReader& first) const {
+    constexpr std::uint64_t kYear = 365ULL * 86400 * 1'000'000'000;
+    for (const Table& table : tables_) {
+      const TableReader& reader = *table.reader;
+      const std::optional<TableColumn>& column = reader.layout().time.column;
+      // The difference of two timestamps can exceed the range of a Timestamp.
+      const auto step = static_cast<std::uint64_t>(reader.timestamp()) -
+                        static_cast<std::uint64_t>(first.timestamp());
+      if (!reader.has_row() || !column || step <= kYear) continue;
+      reader.row().Fail(*column,
+                        "is more than a year after the first time of " + first.name() + ", " +
+                            internal::SecondsText(first.timestamp()),
+                        "the same origin of all times: the unit of this column, such as 'time: "
+                        "{unit: ns}', or an 'offset_s'");
+    }
   }
 
   void AddRow(const Table& table) {
@@ -220,6 +241,7 @@ class TablesSource : public Source {
   std::vector<Table> tables_;
   std::deque<PendingFrame> frames_;  ///< in the order of time
   Place place_;
+  bool has_rows_ = false;  ///< true if the first rows of all tables were read
 };
 
 }  // namespace

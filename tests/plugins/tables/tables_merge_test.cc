@@ -198,6 +198,35 @@ TEST_F(Tables, AnOffsetMovesAllTimesOfATable) {
 
 // ---- gaps ---------------------------------------------------------------------------------------
 
+TEST_F(Tables, EpochTimesInTwoFormsAreMerged) {
+  Write("a.csv", "t,x\n1403715273262142976,1\n1403715273462142976,2\n");
+  Write("b.csv", "t,y\n1403715273.362142976,3\n");
+  EXPECT_EQ(
+      Timestamps(Frames("files:\n- {path: a.csv, time: {column: t, unit: ns}, streams: {x: "
+                        "x}}\n- {path: b.csv, time: {column: t}, streams: {y: y}}\n")),
+      (std::vector<Timestamp>{1403715273262142976, 1403715273362142976, 1403715273462142976}));
+}
+
+// A unit or an origin is wrong: the files would follow each other.
+TEST_F(Tables, FirstTimesMoreThanAYearApartAreAnError) {
+  Write("a.csv", "t,x\n1403715273.3,1\n1403715273.4,2\n");
+  Write("b.csv", "t,y\n0.1,3\n");
+  const std::string config =
+      "files:\n- {path: a.csv, time: {column: t}, streams: {x: x}}\n"
+      "- {path: b.csv, time: {column: t}, streams: {y: y}}\n";
+  for (const bool any_order : {false, true}) {
+    any_order_ = any_order;
+    ExpectError(ExitCode::kBadData,
+                "FILE:2:1 t: '1403715273.3' is more than a year after the first time of " +
+                    (folder_ / "b.csv").string() +
+                    ", 0.100000 s; expected the same origin of all times: the unit of this column, "
+                    "such as 'time: {unit: ns}', or an 'offset_s'",
+                [&] { Frames(config); });
+  }
+  Write("b.csv", "t,y\n1380000000,3\n");
+  EXPECT_EQ(Frames(config).size(), 3u) << "less than a year";
+}
+
 TEST_F(Tables, ARowTooFarAheadIsAnError) {
   const std::string text = "t_s,x\n0,1\n10,2\n31536000,3\n20,4\n";
   ExpectBadData(text,

@@ -40,12 +40,13 @@ TEST_F(Tables, ConvertsUnitsGainsAndOffsets) {
       "path: a.csv\nstreams:\n"
       "  heading: {columns: compass, unit: deg, gain: -1, offset: 90deg}\n"
       "  speed: {columns: v, unit: km/h}\n"
-      "  imu: {columns: [ax, ay, compass], unit: [g, mg, deg], gain: [1, -1, 2], offset: 1}\n");
+      "  imu: {columns: [ax, ay, compass], unit: [g, mg, deg], gain: [1, -1, 2], offset: "
+      "[1, 1m/s^2, 90]}\n");
   EXPECT_NEAR(frames[0].measurements[0].values[0], 0.0, 1e-15);
   EXPECT_DOUBLE_EQ(frames[0].measurements[1].values[0], 10.0);
-  EXPECT_DOUBLE_EQ(frames[0].measurements[2].values[0], 1.0 + 9.80665);
+  EXPECT_DOUBLE_EQ(frames[0].measurements[2].values[0], 2.0 * 9.80665);
   EXPECT_DOUBLE_EQ(frames[0].measurements[2].values[1], 1.0 - 2e-3 * 9.80665);
-  EXPECT_DOUBLE_EQ(frames[0].measurements[2].values[2], 1.0 + std::numbers::pi);
+  EXPECT_DOUBLE_EQ(frames[0].measurements[2].values[2], 1.5 * std::numbers::pi);
   ExpectBadConfig("path: a.csv\nstreams: {v: {columns: v, unit: kmh}}\n",
                   "run.yaml:2:33 streams.v.unit: 'kmh' is not a unit; expected a unit such as deg, "
                   "deg/s, km/h, ft or mm/s^2, or one of " +
@@ -53,6 +54,20 @@ TEST_F(Tables, ConvertsUnitsGainsAndOffsets) {
   ExpectBadConfig("path: a.csv\nstreams: {a: {columns: [ax, ay], gain: [1, 2, 3]}}\n",
                   "run.yaml:2:40 streams.a.gain: a list of 3; expected one value, or 2, one for "
                   "each column");
+}
+
+TEST_F(Tables, AnOffsetIsInTheUnitOfItsColumn) {
+  const std::string heading = "path: a.csv\nstreams: {h: {columns: h, unit: deg, gain: -1, ";
+  Write("t_s,h\n0,30\n");
+  const double expected = std::numbers::pi / 3.0;
+  EXPECT_DOUBLE_EQ(Frames(heading + "offset: 90}}\n")[0].measurements[0].values[0], expected);
+  EXPECT_DOUBLE_EQ(Frames(heading + "offset: 90deg}}\n")[0].measurements[0].values[0], expected);
+  // The offset of a reciprocal does not have the unit of the column.
+  EXPECT_DOUBLE_EQ(Frames("path: a.csv\nstreams: {h: {columns: h, unit: km, reciprocal: true, "
+                          "offset: 2}}\n")[0]
+                       .measurements[0]
+                       .values[0],
+                   2.0 + 1.0 / 30e3);
 }
 
 TEST_F(Tables, TruthHasUnitsToo) {

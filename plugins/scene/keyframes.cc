@@ -19,8 +19,10 @@ Keyframes::Keyframes(Params& p, std::uint64_t seed) : noise_(seed, 5) {
                            "noise of a relative orientation, 1 sigma");
   measures_previous_ = p.Flag("keyframes.to_previous",
                               "whether the pose of the previous keyframe is measured", true);
-  radius_ = p.NonNegative("keyframes.closure_radius_m", "m",
-                          "largest distance of a keyframe that closes a loop; 0: no loops", 0.0);
+  radius_ =
+      p.NumberOrNone("keyframes.closure_radius_m", "m",
+                     "largest distance of a keyframe that closes a loop; none: no loops", kPositive)
+          .value_or(0.0);
   min_keyframes_between_ = static_cast<std::size_t>(p.Integer(
       "keyframes.closure_after",
       "minimum number of keyframes between the two keyframes that close a loop", 1, 1'000'000, 50));

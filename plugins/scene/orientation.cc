@@ -33,12 +33,12 @@ Quaternion ReadQuaternion(const Node& node) {
 }
 
 Quaternion ReadOrientation(const Node& node) {
-  const auto [kind, value] = OneOf(node, {"euler_deg", "matrix", "axis_angle_deg", "quaternion"});
+  const auto [kind, value] = OneOf(node, {"rpy_deg", "matrix", "axis_angle_deg", "quaternion"});
   constexpr double kRadPerDeg = std::numbers::pi / 180.0;
   using Eigen::AngleAxisd;
   using Eigen::Vector3d;
   if (kind == "quaternion") return ReadQuaternion(value);
-  if (kind == "euler_deg") {
+  if (kind == "rpy_deg") {
     const Vector3d angle = kRadPerDeg * ReadVector(value);
     return ToArray(Eigen::Quaterniond(AngleAxisd(angle.z(), Vector3d::UnitZ()) *
                                       AngleAxisd(angle.y(), Vector3d::UnitY()) *

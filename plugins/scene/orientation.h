@@ -20,7 +20,7 @@ Quaternion ReadQuaternion(const Node& node);
 
 /// Reads the orientation of a keyframe, which has one of four forms:
 ///
-///   euler_deg: [x, y, z]          R = Rz(z) Ry(y) Rx(x)
+///   rpy_deg: [roll, pitch, yaw]   R = Rz(yaw) Ry(pitch) Rx(roll)
 ///   matrix: [[,,], [,,], [,,]]    R, orthonormal to 1e-3, det 1; replaced by the nearest rotation
 ///   axis_angle_deg: [x, y, z, a]  rotation by a about the axis (x, y, z), which is not 0
 ///   quaternion: {w, x, y, z}      Hamilton, unit

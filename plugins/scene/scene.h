@@ -14,7 +14,7 @@ inline constexpr const char* kSceneKeys =
     "points.shells         {centre, radii}, m: points are drawn on spheres\n"
     "points.count          number of points that are drawn\n"
     "trajectory.look_at    [{position, target, t_s}, ...]; trajectory.up: upward direction\n"
-    "trajectory.keyframes  [{position, t_s, euler_deg | matrix | axis_angle_deg | quaternion}, "
+    "trajectory.keyframes  [{position, t_s, rpy_deg | matrix | axis_angle_deg | quaternion}, "
     "...]\n"
     "trajectory.random     noise and initial state of quaternion_pose, for a random trajectory\n"
     "surfaces              [{box: {min, max}}, {rectangle: {corner, right, down}}, ...], m, each "

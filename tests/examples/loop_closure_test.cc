@@ -29,7 +29,7 @@ TEST(LoopClosure, TakesTheDriftOutOfFilterAndBatch) {
 #ifdef ALIDADE_WITHOUT_CERES
   GTEST_SKIP() << "this build does not contain the Ceres solver";
 #endif
-  const auto open = SweepLoops("0"), closed = SweepLoops("1");
+  const auto open = SweepLoops("none"), closed = SweepLoops("1");
   const auto mean = [](const auto& of, const char* metric) { return of.metrics.at(metric).mean; };
   for (std::size_t i = 0; i < 2; ++i) {
     EXPECT_LT(mean(closed[i], "map.sim3.rmse"), 0.2 * mean(open[i], "map.sim3.rmse"));

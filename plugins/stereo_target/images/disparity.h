@@ -14,17 +14,18 @@ namespace alidade {
 
 /// Requirements for a disparity.
 struct DisparityOptions {
-  double max_px;          ///< largest disparity of the search
+  double max_px;          ///< largest disparity of the search; 0: the whole image
   double min_similarity;  ///< minimum correlation of the target between both images
   double min_distinct;    ///< minimum difference of the best and the next best correlation
   double max_row_px;      ///< maximum difference of the rows of the target
   double max_sigma_px;    ///< maximum standard deviation of a disparity
 
   explicit DisparityOptions(Params& p)
-      : max_px(p.NonNegative("disparity.max_px", "px",
-                             "largest disparity of the search; nearer targets have no disparity; "
-                             "0: search the whole image",
-                             0.0)),
+      : max_px(p.NumberOrNone("disparity.max_px", "px",
+                              "largest disparity of the search; nearer targets have no disparity; "
+                              "none: search the whole image",
+                              kPositive)
+                   .value_or(0.0)),
         min_similarity(p.Number("disparity.min_similarity", "1",
                                 "minimum correlation of the target between both images",
                                 {-1.0, 1.0}, 0.8)),

@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-const std::string kStill = "trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}]}";
+const std::string kStill = "trajectory: {keyframes: [{position: [0, 0, 0], rpy_deg: [0, 0, 0]}]}";
 
 std::set<std::int64_t> Ids(const Frame& frame, int stream = 0) {
   std::set<std::int64_t> ids;
@@ -75,7 +75,7 @@ TEST(Scene, NoiseIsThatOfTheConfig) {
   const std::string keys =
       "max_frames: 20, points: {box: {min: [-1, -0.8, 2], max: [1, 0.8, 3]}, count: 500}, "
       "measures: depth, sigma_depth_m: 0.01, trajectory: {keyframes: [{position: [0, 0, -1], "
-      "euler_deg: [0, 0, 0]}]}";
+      "rpy_deg: [0, 0, 0]}]}";
   const auto exact = SceneFrames("sigma_px: 0, " + keys);
   const auto noisy = SceneFrames("sigma_px: 2, " + keys);
   const MadeScene made = MakeScene("sigma_px: 2, " + keys);
@@ -147,8 +147,8 @@ TEST(Scene, TellsTheDepthOfTheFirstObservationOfTheKnown) {
 TEST(Scene, KeyframesTellTheWayToOneAnother) {
   const std::string keys =
       "max_frames: 9, rate_hz: 1, points: {list: [[0, 0, 5], [0, 0, 6]]}, trajectory: {keyframes: "
-      "[{t_s: 0, position: [0, 0, 0], euler_deg: [0, 0, 0]}, {t_s: 4, position: [4, 0, 0], "
-      "euler_deg: [0, 90, 0]}, {t_s: 8, position: [0, 0, 0], euler_deg: [0, 0, 0]}]}, keyframes: "
+      "[{t_s: 0, position: [0, 0, 0], rpy_deg: [0, 0, 0]}, {t_s: 4, position: [4, 0, 0], "
+      "rpy_deg: [0, 90, 0]}, {t_s: 8, position: [0, 0, 0], rpy_deg: [0, 0, 0]}]}, keyframes: "
       "{every_frames: 2, closure_radius_m: 0.5, closure_after: 2, sigma_position_m: 0, "
       "sigma_orientation_rad: 0}";
   const MadeScene made = MakeScene(keys);
@@ -194,15 +194,15 @@ TEST(Scene, OfTooManyPointsKeepsThoseItSaw) {
   const auto frames = SceneFrames(
       "max_frames: 30, sigma_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [0, 0, "
       "4], "
-      "[0.5, 0, 4]]}, trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}, "
-      "{position: [1, 0, 0], euler_deg: [0, 0, 0]}]}");
+      "[0.5, 0, 4]]}, trajectory: {keyframes: [{position: [0, 0, 0], rpy_deg: [0, 0, 0]}, "
+      "{position: [1, 0, 0], rpy_deg: [0, 0, 0]}]}");
   for (const SourceFrame& frame : frames) EXPECT_EQ(Ids(frame), (std::set<std::int64_t>{1, 2}));
   // When one of the other points leaves the image, point 0 is measured.
   const auto all = SceneFrames(
       "max_frames: 30, sigma_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [-2, 0, "
       "4], "
-      "[0.5, 0, 4]]}, trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}, "
-      "{position: [1, 0, 0], euler_deg: [0, 0, 0]}]}");
+      "[0.5, 0, 4]]}, trajectory: {keyframes: [{position: [0, 0, 0], rpy_deg: [0, 0, 0]}, "
+      "{position: [1, 0, 0], rpy_deg: [0, 0, 0]}]}");
   EXPECT_EQ(Ids(all.front()), (std::set<std::int64_t>{1, 2}));
   EXPECT_EQ(Ids(all.back()), (std::set<std::int64_t>{0, 2}));
 }
@@ -289,16 +289,16 @@ TEST(Scene, RefusesWhatMakesNoScene) {
               "{w: 1, x: 1, y: 0, z: 0}}]}",
           "quaternion: the quaternion does not have unit length");
   refused(kPoints +
-              ", trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0], "
+              ", trajectory: {keyframes: [{position: [0, 0, 0], rpy_deg: [0, 0, 0], "
               "axis_angle_deg: [0, 0, 1, 5]}]}",
-          "'euler_deg' and 'axis_angle_deg' are both given");
+          "'rpy_deg' and 'axis_angle_deg' are both given");
   refused(kPoints +
-              ", trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], euler_deg: "
-              "[0, 0, 0]}, {t_s: 0, position: [0, 0, 0], euler_deg: [0, 0, 0]}]}",
+              ", trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], rpy_deg: "
+              "[0, 0, 0]}, {t_s: 0, position: [0, 0, 0], rpy_deg: [0, 0, 0]}]}",
           "keyframes[1].t_s: this time is not later than the time of the previous item");
   refused(kPoints +
               ", max_frames: 31, trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], "
-              "euler_deg: [0, 0, 0]}, {t_s: 0.5, position: [0, 0, 0], euler_deg: "
+              "rpy_deg: [0, 0, 0]}, {t_s: 0.5, position: [0, 0, 0], rpy_deg: "
               "[0, 0, 0]}]}",
           "keyframes[1].t_s: the trajectory ends before the last frame; expected at least 1.0");
   refused(kPoints + ", trajectory: {random: {linear_acceleration: -1, angular_acceleration: 1}}",

@@ -147,21 +147,21 @@ TEST(ScenePath, EveryFormOfAnOrientationSaysTheSame) {
     EXPECT_EQ(frames.at(0).truth[0], (std::vector<double>{1, 2, 3}));
     return Rotated(frames[0].truth[1], Vector3d::UnitZ());
   };
-  for (const char* form : {"euler_deg: [0, 90, 0]", "matrix: [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]",
+  for (const char* form : {"rpy_deg: [0, 90, 0]", "matrix: [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]",
                            "axis_angle_deg: [0, 2, 0, 90]",
                            "quaternion: {w: 0.70710678, x: 0, y: 0.70710678, z: 0}"}) {
     EXPECT_LT((ahead(form) - Vector3d::UnitX()).norm(), 1e-7) << form;
   }
   // In Rz(90) Ry(0) Rx(90), the rotation about x maps z to -y. The rotation about z maps -y to x.
-  EXPECT_LT((ahead("euler_deg: [90, 0, 90]") - Vector3d::UnitX()).norm(), 1e-15);
+  EXPECT_LT((ahead("rpy_deg: [90, 0, 90]") - Vector3d::UnitX()).norm(), 1e-15);
 }
 
 TEST(ScenePath, VelocitiesLeadFromFrameToFrameAsQuaternionPoseHasIt) {
   for (const std::string& path :
        {kSweep,
-        std::string("trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}, "
-                    "{position: [1, 0, 1], euler_deg: [10, 20, 30]}, "
-                    "{position: [0, 1, 1], euler_deg: [40, 0, -30]}]}"),
+        std::string("trajectory: {keyframes: [{position: [0, 0, 0], rpy_deg: [0, 0, 0]}, "
+                    "{position: [1, 0, 1], rpy_deg: [10, 20, 30]}, "
+                    "{position: [0, 1, 1], rpy_deg: [40, 0, -30]}]}"),
         std::string("trajectory: {random: {linear_acceleration: 3, angular_acceleration: "
                     "[1, 2, 3], velocity: [0.4, 0, 0], angular_velocity: [0, 1, 0]}}")}) {
     const auto frames = SceneFrames("max_frames: 50, rate_hz: 20, " + kPoints + ", " + path);

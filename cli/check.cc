@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "alidade/experiment/calibration.h"
-#include "alidade/formula/formula_name.h"
+#include "alidade/plugin/built_in_models.h"
 #include "command.h"
 #include "console.h"
 

@@ -20,10 +20,10 @@
 #include "alidade/experiment/defect_node.h"
 #include "alidade/experiment/read_landmarks.h"
 #include "alidade/formula/formula_motion.h"
-#include "alidade/formula/formula_name.h"
 #include "alidade/formula/formula_sensor.h"
 #include "alidade/formula/linear_motion.h"
 #include "alidade/formula/linear_sensor.h"
+#include "alidade/plugin/built_in_models.h"
 #include "alidade/state/element_names.h"
 #include "alidade/state/quaternion_sign.h"
 

@@ -13,7 +13,7 @@
 #include "alidade/experiment/estimator_plugin.h"
 #include "alidade/experiment/estimator_registry.h"
 #include "alidade/experiment/read_problem.h"
-#include "alidade/formula/formula_name.h"
+#include "alidade/plugin/built_in_models.h"
 
 namespace alidade {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "alidade/config/config.h"
 #include "alidade/formula/compiled_function.h"
-#include "alidade/formula/formula_name.h"
+#include "alidade/plugin/built_in_models.h"
 
 namespace alidade::internal {
 

@@ -8,6 +8,7 @@
 #include "alidade/base/text.h"
 #include "alidade/io/log.h"
 #include "alidade/plugin/abi_read.h"
+#include "alidade/plugin/built_in_models.h"
 #include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/create.h"
 #include "alidade/plugin/load.h"
@@ -192,6 +193,9 @@ void PluginHost::FailMissing(const std::string& kind, const std::string& name,
     }
     if (entry.kind == kind) names.push_back(entry.name);
     if (entry.name == name) problem += "; there is " + WithArticle(entry.kind) + " with this name";
+  }
+  for (const internal::BuiltInModel& model : internal::kBuiltInModels) {
+    if (kind == kSensorKind || kind == kMotionKind) names.emplace_back(model.name);
   }
   ExitCode code = ExitCode::kPlugin;
   for (const Refusal& refusal : refusals_) {

@@ -14,8 +14,8 @@
 #include "alidade/experiment/estimator_registry.h"
 #include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/short_forms.h"
-#include "alidade/formula/formula_name.h"
 #include "alidade/io/text_table.h"
+#include "alidade/plugin/built_in_models.h"
 #include "alidade/plugin/create.h"
 
 namespace alidade {

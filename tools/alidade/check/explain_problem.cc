@@ -10,7 +10,7 @@
 #include "alidade/check/explain_parts.h"
 #include "alidade/estimation/observability.h"
 #include "alidade/experiment/truth_match.h"
-#include "alidade/formula/formula_name.h"
+#include "alidade/plugin/built_in_models.h"
 
 namespace alidade::internal {
 

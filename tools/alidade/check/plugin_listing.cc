@@ -13,6 +13,7 @@
 #include "alidade/experiment/source_plugin.h"
 #include "alidade/io/json.h"
 #include "alidade/io/text_table.h"
+#include "alidade/plugin/built_in_models.h"
 #include "alidade/plugin/create.h"
 
 namespace alidade {
@@ -32,15 +33,26 @@ std::ptrdiff_t RankOf(const std::string& kind) {
   return std::ranges::find(kOrder, kind) - kOrder.begin();
 }
 
-std::vector<const PluginEntry*> Sorted(const PluginHost& host) {
-  std::vector<const PluginEntry*> entries;
-  for (const PluginEntry& entry : host.entries()) entries.push_back(&entry);
-  std::sort(entries.begin(), entries.end(), [](const PluginEntry* a, const PluginEntry* b) {
-    return std::tuple(RankOf(a->kind), a->kind, a->name, a->plugin) <
-           std::tuple(RankOf(b->kind), b->kind, b->name, b->plugin);
+/// Returns the entries of the plugins and those that are part of the program, whose `plugin` is
+/// empty, in the order of the listing.
+std::vector<PluginEntry> AllEntries(const PluginHost& host) {
+  std::vector<PluginEntry> entries = host.entries();
+  for (const internal::BuiltInModel& model : internal::kBuiltInModels) {
+    for (const char* const kind : {kSensorKind, kMotionKind}) {
+      entries.push_back({kind, model.name, model.doc, "", "", ""});
+    }
+  }
+  for (const EstimatorType& type : EstimatorTypes()) {
+    entries.push_back({kEstimatorKind, type.name, type.doc, "", "", ""});
+  }
+  std::ranges::sort(entries, [](const PluginEntry& a, const PluginEntry& b) {
+    return std::tuple(RankOf(a.kind), a.kind, a.name, a.plugin) <
+           std::tuple(RankOf(b.kind), b.kind, b.name, b.plugin);
   });
   return entries;
 }
+
+bool IsBuiltIn(const PluginEntry& entry) { return entry.plugin.empty(); }
 
 /// Appends to `keys` the keys that all types of estimator have.
 std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
@@ -67,22 +79,27 @@ std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
 }
 
 std::vector<ParamInfo> KeysOf(const PluginEntry& entry) {
-  if (entry.kind == kEstimatorKind) return WithCommonKeys(EstimatorSchema(entry));
+  if (entry.kind == kEstimatorKind) {
+    return WithCommonKeys(IsBuiltIn(entry) ? FindEstimatorType(entry.name)->schema()
+                                           : EstimatorSchema(entry));
+  }
   if (entry.kind == kSourceKind) return SourceSchema(entry);
-  return entry.is_model() ? ModelSchema(entry) : std::vector<ParamInfo>();
+  return entry.is_model() && !IsBuiltIn(entry) ? ModelSchema(entry) : std::vector<ParamInfo>();
 }
 
-/// Finds the entries with the given name. The result is empty only for a built-in estimator.
-std::vector<const PluginEntry*> EntriesNamed(const PluginHost& host, const std::string& name) {
-  std::vector<const PluginEntry*> entries = Sorted(host);
-  std::vector<std::string> names;
-  for (const EstimatorType& type : EstimatorTypes()) names.emplace_back(type.name);
-  for (const PluginEntry* entry : entries) names.push_back(entry->name);
-  std::erase_if(entries, [&](const PluginEntry* entry) { return entry->name != name; });
-  if (entries.empty() && FindEstimatorType(name) == nullptr) {
+std::vector<std::string> DescriptionOf(const PluginEntry& entry) {
+  return IsBuiltIn(entry) ? std::vector<std::string>() : DescribeModel(entry);
+}
+
+/// Returns the entries with the given name. Error: kPlugin if there is no such entry.
+std::vector<PluginEntry> EntriesNamed(const PluginHost& host, const std::string& name) {
+  std::vector<PluginEntry> entries = AllEntries(host);
+  const std::vector<std::string> names = internal::NamesOf(entries);
+  std::erase_if(entries, [&](const PluginEntry& entry) { return entry.name != name; });
+  if (entries.empty()) {
     const std::string nearest = Nearest(name, names);
     throw Error(ExitCode::kPlugin,
-                ErrorLine({}, {}, "no plugin entry or built-in estimator is named '" + name + "'",
+                ErrorLine({}, {}, "no model, source or estimator is named '" + name + "'",
                           "a name from `alidade plugins list`", nearest) +
                     (nearest.empty() ? "\n" + PluginPlaces(host) : ""));
   }
@@ -124,38 +141,26 @@ Json JsonOf(const std::vector<ParamInfo>& schema) {
 }  // namespace
 
 std::string PluginList(const PluginHost& host, bool files) {
-  const std::vector<const PluginEntry*> entries = Sorted(host);
   std::vector<TextRow> rows;
   std::string kind;
-  const auto add = [&](const std::string& row_kind, TextRow row) {
-    if (row_kind != kind) rows.push_back({(rows.empty() ? "" : "\n") + row_kind + 's'});
-    kind = row_kind;
-    if (!files) row.pop_back();
-    rows.push_back(std::move(row));
-  };
-  for (const PluginEntry* entry : entries) {
-    add(entry->kind, {"  " + entry->name, entry->doc, entry->plugin.string()});
+  for (const PluginEntry& entry : AllEntries(host)) {
+    if (entry.kind != kind) rows.push_back({(rows.empty() ? "" : "\n") + entry.kind + 's'});
+    kind = entry.kind;
+    rows.push_back({"  " + entry.name, entry.doc});
+    if (files) rows.back().push_back(IsBuiltIn(entry) ? "built in" : entry.plugin.string());
   }
-  for (const EstimatorType& type : EstimatorTypes()) {
-    add(kEstimatorKind, {std::string("  ") + type.name, type.doc, "built in"});
-  }
-  return TextTable(rows) + (entries.empty() ? "\nno plugins found\n" : "");
+  return TextTable(rows) + (host.entries().empty() ? "\nno plugins found\n" : "");
 }
 
 std::string PluginListJson(const PluginHost& host) {
   Json json = Json::array();
-  for (const PluginEntry* entry : Sorted(host)) json.push_back(JsonOf(*entry));
-  for (const EstimatorType& type : EstimatorTypes()) {
-    json.push_back(JsonOf({kEstimatorKind, type.name, type.doc, "", "", ""}));
-  }
+  for (const PluginEntry& entry : AllEntries(host)) json.push_back(JsonOf(entry));
   return internal::JsonText(json);
 }
 
 std::vector<ParamInfo> internal::KeysOf(const PluginHost& host, const std::string& kind,
                                         const std::string& name) {
-  const EstimatorType* const type = kind == kEstimatorKind ? FindEstimatorType(name) : nullptr;
-  if (type != nullptr) return WithCommonKeys(type->schema());
-  for (const PluginEntry& entry : host.entries()) {
+  for (const PluginEntry& entry : AllEntries(host)) {
     if (entry.kind == kind && entry.name == name) return alidade::KeysOf(entry);
   }
   return {};
@@ -163,36 +168,26 @@ std::vector<ParamInfo> internal::KeysOf(const PluginHost& host, const std::strin
 
 std::string PluginInfo(const PluginHost& host, const std::string& name) {
   std::string text;
-  if (const EstimatorType* type = FindEstimatorType(name)) {
-    text =
-        name + ": estimator\n  " + type->doc + "\n\n" + Parameters(WithCommonKeys(type->schema()));
-  }
-  for (const PluginEntry* entry : EntriesNamed(host, name)) {
+  for (const PluginEntry& entry : EntriesNamed(host, name)) {
     if (!text.empty()) text += '\n';
-    text += entry->name + ": " + entry->kind + "\n  " + entry->doc + '\n';
-    if (!entry->citation.empty()) text += "  source: " + entry->citation + '\n';
-    text += "  plugin: " + entry->plugin.string() + '\n';
-    text += '\n';
-    const std::vector<std::string> lines = DescribeModel(*entry);
-    for (const std::string& line : lines) text += "  " + line + '\n';
+    text += entry.name + ": " + entry.kind + "\n  " + entry.doc + '\n';
+    if (!entry.citation.empty()) text += "  source: " + entry.citation + '\n';
+    text += "  plugin: " + (IsBuiltIn(entry) ? "built in" : entry.plugin.string()) + '\n';
+    const std::vector<std::string> lines = DescriptionOf(entry);
     if (!lines.empty()) text += '\n';
-    text += Parameters(KeysOf(*entry));
+    for (const std::string& line : lines) text += "  " + line + '\n';
+    const bool has_keys_in_config = IsBuiltIn(entry) && entry.kind != kEstimatorKind;
+    if (!has_keys_in_config) text += '\n' + Parameters(KeysOf(entry));
   }
   return text;
 }
 
 std::string PluginInfoJson(const PluginHost& host, const std::string& name) {
   Json json = Json::array();
-  if (const EstimatorType* type = FindEstimatorType(name)) {
-    json.push_back({{"name", type->name},
-                    {"kind", "estimator"},
-                    {"doc", type->doc},
-                    {"parameters", JsonOf(WithCommonKeys(type->schema()))}});
-  }
-  for (const PluginEntry* entry : EntriesNamed(host, name)) {
-    Json& object = json.emplace_back(JsonOf(*entry));
-    object["describes"] = DescribeModel(*entry);
-    object["parameters"] = JsonOf(KeysOf(*entry));
+  for (const PluginEntry& entry : EntriesNamed(host, name)) {
+    Json& object = json.emplace_back(JsonOf(entry));
+    object["describes"] = DescriptionOf(entry);
+    object["parameters"] = JsonOf(KeysOf(entry));
   }
   return internal::JsonText(json);
 }

@@ -10,6 +10,15 @@ namespace alidade::internal {
 inline constexpr const char* kFormula = "formula";
 inline constexpr const char* kLinear = "linear";
 
+/// Sensor model and motion model that is part of the program.
+struct BuiltInModel {
+  const char* name;
+  const char* doc;
+};
+inline constexpr BuiltInModel kBuiltInModels[] = {
+    {kFormula, "the expressions of its entry in the config (docs/formula.md)"},
+    {kLinear, "the matrices of its entry in the config (docs/formula.md)"}};
+
 /// Returns whether the equations of a model are in its config entry.
 inline bool HasEquationsInConfig(std::string_view model) {
   return model == kFormula || model == kLinear;

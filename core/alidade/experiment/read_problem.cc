@@ -510,18 +510,6 @@ SharedSensor CreateFromEquations(const std::string& model, const Node& entry, co
                           : internal::CreateFormulaSensor(entry, bound_roles, has_landmark);
 }
 
-/// Returns the geometry of the block that each role of `roles` is bound to. Omits roles whose block
-/// does not exist, which ReadRole rejects, and those of landmarks.
-std::map<std::string, std::string> BoundGeometries(const Node& roles, const Problem& problem) {
-  std::map<std::string, std::string> geometries;
-  for (const auto& [role, node] : roles.Entries()) {
-    const std::optional<Node> block = node.is_map() ? node.Find("block") : node;
-    const BlockId id = block ? problem.layout.Find(block->Text()) : -1;
-    if (id >= 0) geometries[role] = ToString(problem.layout[id].geometry());
-  }
-  return geometries;
-}
-
 /// Rejects a role that the model does not have.
 void RejectUnknownRoles(const Node& roles, const SensorModel& model) {
   std::vector<std::string> known;
@@ -546,7 +534,7 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
   const SharedSensor model =
       internal::HasEquationsInConfig(model_name)
           ? CreateFromEquations(model_name, entry, roles, problem)
-          : host.CreateSensor(model_name, entry, {}, BoundGeometries(roles, problem));
+          : host.CreateSensor(model_name, entry, {}, BoundGeometries(roles, problem.layout));
   if (const auto loss = entry.Find("loss")) options.loss = ReadLoss(*loss);
   RejectUnknownRoles(roles, *model);
   OwnedStateReader owned_states(name, entry, roles, *model);
@@ -646,6 +634,16 @@ std::vector<double> ReadBlockValue(const Node& node, const Space& space) {
 }
 
 SharedMotion CreateStateModel(const std::string& model, const Node& entry, const PluginHost& host) {
+std::map<std::string, std::string> BoundGeometries(const Node& roles, const StateLayout& blocks) {
+  std::map<std::string, std::string> geometries;
+  for (const auto& [role, node] : roles.Entries()) {
+    const std::optional<Node> block = node.is_map() ? node.Find("block") : node;
+    const BlockId id = block ? blocks.Find(block->Text()) : -1;
+    if (id >= 0) geometries[role] = ToString(blocks[id].geometry());
+  }
+  return geometries;
+}
+
   if (model == kFormula) return internal::CreateFormulaMotion(entry);
   if (model == kLinear) return internal::CreateLinearMotion(entry);
   return host.CreateMotion(model, entry);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +24,10 @@ Problem ReadProblem(const Node& root, const PluginHost& host,
 SharedMotion CreateStateModel(const std::string& model, const Node& entry, const PluginHost& host);
 
 /// Reads a value of the space: a number or a list of numbers. A unit quaternion is a list
+/// Returns the geometry of the block that each role of the map `roles` is bound to. Omits roles whose
+/// block does not exist, and those of landmarks.
+std::map<std::string, std::string> BoundGeometries(const Node& roles, const StateLayout& blocks);
+
 /// [w, x, y, z], a map {w: , x: , y: , z: }, or {rpy_deg: [ROLL, PITCH, YAW]}. Error: kBadConfig,
 /// also for a unit vector or unit quaternion whose length differs from 1 by more than
 /// kUnitTolerance.

@@ -2,6 +2,7 @@
 #include "alidade/experiment/short_forms.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <set>
@@ -106,12 +107,9 @@ void ExpandInitial(ConfigTree* value, const std::vector<double>& mean) {
   }
 }
 
-/// Blocks of each state entry, with their names in the config.
-using Blocks = std::map<std::string, std::vector<Space>, std::less<>>;
-
 /// Expands the initial values of the state entries. Returns their blocks.
-Blocks ExpandStates(const ConfigTree& root, const PluginHost& host) {
-  Blocks blocks;
+StateLayout ExpandStates(const ConfigTree& root, const PluginHost& host) {
+  StateLayout blocks;
   const ConfigTree* const state = ChildMap(root, "state");
   if (state == nullptr) return blocks;
   for (const auto& entry : state->children) {
@@ -122,43 +120,43 @@ Blocks ExpandStates(const ConfigTree& root, const PluginHost& host) {
     const bool has_equations = internal::HasEquationsInConfig(model->text);
     const ConfigTree* const renamed = has_equations ? nullptr : ChildMap(*entry, "blocks");
     const ConfigTree* const initial = ChildMap(*entry, "initial");
-    for (Space block : motion->blocks()) {
-      const ConfigTree* const name = renamed == nullptr ? nullptr : ChildText(*renamed, block.name);
-      if (name != nullptr) block.name = name->text;
-      if (initial != nullptr) ExpandInitial(Child(*initial, block.name), block.geometry.Identity());
-      blocks[entry->key].push_back(block);
+    for (const Space& block : motion->blocks()) {
+      const ConfigTree* const new_name =
+          renamed == nullptr ? nullptr : ChildText(*renamed, block.name);
+      const std::string& name = new_name == nullptr ? block.name : new_name->text;
+      if (initial != nullptr) ExpandInitial(Child(*initial, name), block.geometry.Identity());
+      const std::string full_name = entry->key + '.' + name;
+      if (blocks.Find(full_name) < 0) blocks.Declare(full_name, entry->key, block);
     }
   }
   return blocks;
 }
+
+/// Returns the name of the block in its entry.
+std::string NameInEntry(const Block& block) { return block.name.substr(block.owner.size() + 1); }
 
 /// Returns whether the units do not differ. A unit that is not declared is not compared.
 bool HasUnitOf(const Space& block, const Space& role) {
   return block.unit.empty() || role.unit.empty() || block.unit == role.unit;
 }
 
-/// Block of a state entry, with its name in the form ENTRY.BLOCK.
-struct NamedBlock {
-  std::string name;
-  const Space* space;
-};
-
 /// Returns the blocks of the entries in `roles`, which is the name of a state entry or a list of
 /// such names.
-std::vector<NamedBlock> BlocksOf(const Node& roles, const Blocks& blocks) {
-  std::vector<NamedBlock> named;
+std::vector<Block> BlocksOf(const Node& roles, const StateLayout& blocks) {
+  std::vector<Block> offered;
   for (const Node& item : roles.ItemsOrOne()) {
     const std::string entry = item.Text();
-    const auto found = blocks.find(entry);
-    if (found == blocks.end()) {
-      std::vector<std::string> entries;
-      for (const auto& [name, spaces] : blocks) entries.push_back(name);
-      item.Fail("state entry " + Quoted(entry) + " does not exist",
-                Join(entries) + ", or a map {ROLE: ENTRY.BLOCK}", Nearest(entry, entries));
-    }
-    for (const Space& block : found->second) named.push_back({entry + '.' + block.name, &block});
+    const std::size_t count = offered.size();
+    std::ranges::copy_if(blocks.blocks(), std::back_inserter(offered),
+                         [&](const Block& block) { return block.owner == entry; });
+    if (offered.size() > count) continue;
+    std::set<std::string> entries;
+    for (const Block& block : blocks.blocks()) entries.insert(block.owner);
+    item.Fail("state entry " + Quoted(entry) + " does not exist",
+              Join({entries.begin(), entries.end()}) + ", or a map {ROLE: ENTRY.BLOCK}",
+              Nearest(entry, entries));
   }
-  return named;
+  return offered;
 }
 
 /// Returns whether a state entry may fill the role: it belongs neither to a landmark nor to the
@@ -170,10 +168,10 @@ bool IsOfEntry(const Space& role) {
 /// Rejects a role that `matching`, the blocks of its name, geometry and unit, do not determine.
 [[noreturn]] void FailRole(const Node& roles, const Space& role, const SensorModel& model,
                            const std::vector<std::string>& matching,
-                           const std::vector<NamedBlock>& offered) {
+                           const std::vector<Block>& offered) {
   std::vector<std::string> candidates = matching;
-  for (const NamedBlock& block : offered) {
-    if (matching.empty() && HasUnitOf(*block.space, role)) candidates.push_back(block.name);
+  for (const Block& block : offered) {
+    if (matching.empty() && HasUnitOf(block.space, role)) candidates.push_back(block.name);
   }
   const std::string of_role = " role '" + role.name + "' of model '" + model.name() + "' (" +
                               role.unit + (role.unit.empty() ? "" : ": ") + role.doc +
@@ -186,14 +184,13 @@ bool IsOfEntry(const Space& role) {
 /// Binds the roles of `model` to the blocks `offered`. A role is bound to the block that has its
 /// name, its geometry and a unit that does not differ. If only one block is offered, and no role
 /// has its name, it is bound to the first role that the model needs; ReadProblem then checks it.
-void BindRoles(ConfigTree& roles, const SensorModel& model,
-               const std::vector<NamedBlock>& offered) {
+void BindRoles(ConfigTree& roles, const SensorModel& model, const std::vector<Block>& offered) {
   std::map<std::string, std::string> bound;  // role -> block
   for (const Space& role : model.roles()) {
     std::vector<std::string> matching;
-    for (const auto& [name, space] : offered) {
-      const bool matches = space->name == role.name && space->geometry == role.geometry;
-      if (matches && HasUnitOf(*space, role)) matching.push_back(name);
+    for (const Block& block : offered) {
+      const bool matches = NameInEntry(block) == role.name && block.geometry() == role.geometry;
+      if (matches && HasUnitOf(block.space, role)) matching.push_back(block.name);
     }
     if (!IsOfEntry(role) || matching.empty()) continue;
     if (matching.size() > 1) FailRole(Node(&roles), role, model, matching, offered);
@@ -213,33 +210,14 @@ void BindRoles(ConfigTree& roles, const SensorModel& model,
 
 /// Binds each block to a role of the same name, if no earlier block has this name. Omits blocks
 /// without a matrix if the sensor has a map `matrices`.
-void BindEachBlock(ConfigTree& roles, const std::vector<NamedBlock>& offered,
+void BindEachBlock(ConfigTree& roles, const std::vector<Block>& offered,
                    const ConfigTree* matrices) {
   FillMap(roles);
-  for (const NamedBlock& block : offered) {
-    const std::string& role = block.space->name;
+  for (const Block& block : offered) {
+    const std::string role = NameInEntry(block);
     const bool is_needed = matrices == nullptr || Child(*matrices, role) != nullptr;
     if (is_needed && Child(roles, role) == nullptr) FillText(roles, role, block.name);
   }
-}
-
-/// Returns the geometry of the block that each role of the map `roles` is bound to. Omits roles
-/// whose block does not exist.
-std::map<std::string, std::string> BoundGeometries(const ConfigTree& roles, const Blocks& blocks) {
-  std::map<std::string, std::string> geometries;
-  for (const auto& role : roles.children) {
-    const ConfigTree* const block =
-        role->kind == Node::Kind::kMap ? Child(*role, "block") : role.get();
-    if (block == nullptr) continue;
-    for (const auto& [entry, spaces] : blocks) {
-      for (const Space& space : spaces) {
-        if (entry + '.' + space.name == block->text) {
-          geometries[role->key] = ToString(space.geometry);
-        }
-      }
-    }
-  }
-  return geometries;
 }
 
 /// Adds the role `landmark` and the means of the states that the sensor owns.
@@ -257,28 +235,29 @@ void FillFromModel(ConfigTree& entry, const SensorModel& model) {
   }
 }
 
-void ExpandSensor(ConfigTree& entry, const PluginHost& host, const Blocks& blocks) {
+void ExpandSensor(ConfigTree& entry, const PluginHost& host, const StateLayout& blocks) {
   ExpandInitial(ChildMap(entry, "time_offset_s"), {0.0});
   const ConfigTree* const model_name = ChildText(entry, "model");
   ConfigTree* const roles = Child(entry, "roles");
   if (model_name == nullptr || roles == nullptr) return;
-  std::vector<NamedBlock> offered;
+  std::vector<Block> offered;
   const bool has_names = roles->kind == Node::Kind::kScalar || roles->kind == Node::Kind::kList;
   if (has_names) {
     offered = BlocksOf(Node(roles), blocks);
     BindEachBlock(*roles, offered, ChildMap(entry, "H"));
   }
-  if (internal::HasEquationsInConfig(model_name->text)) return;
+  const bool has_equations = internal::HasEquationsInConfig(model_name->text);
+  if (has_equations || roles->kind != Node::Kind::kMap) return;
   // The geometries of the blocks select the variant of the model.
   const SharedSensor model =
-      host.CreateSensor(model_name->text, Node(&entry), {}, BoundGeometries(*roles, blocks));
+      host.CreateSensor(model_name->text, Node(&entry), {}, BoundGeometries(Node(roles), blocks));
   if (has_names) BindRoles(*roles, *model, offered);
   FillFromModel(entry, *model);
 }
 
-void ExpandSensors(const ConfigTree& root, const PluginHost& host, const Blocks& blocks) {
+void ExpandSensors(const ConfigTree& root, const PluginHost& host, const StateLayout& blocks) {
   const ConfigTree* const sensors = ChildMap(root, "sensors");
-  if (sensors == nullptr || blocks.empty()) return;  // the reader reports a missing `state`
+  if (sensors == nullptr || blocks.blocks().empty()) return;  // the reader reports both
   for (const auto& entry : sensors->children) {
     if (entry->kind == Node::Kind::kMap) ExpandSensor(*entry, host, blocks);
   }
@@ -320,7 +299,7 @@ void ExpandPrior(ConfigTree& prior) {
 void ExpandShortForms(Config& config, const PluginHost& host) {
   ConfigTree& root = config.tree();
   ExpandEstimators(root, host);
-  const Blocks blocks = ExpandStates(root, host);
+  const StateLayout blocks = ExpandStates(root, host);
   ExpandSensors(root, host, blocks);
   if (const ConfigTree* const landmarks = ChildMap(root, "landmarks")) {
     if (ConfigTree* const prior = ChildMap(*landmarks, "prior")) ExpandPrior(*prior);

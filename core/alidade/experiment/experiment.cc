@@ -34,6 +34,43 @@ void CheckSchema(const Node& root) {
   }
 }
 
+/// Reads {with: SENSOR} or {without: SENSOR}, {from_s: T, to_s: T}, or both.
+Segment ReadSegment(const std::string& name, const Node& entry, const Node& root,
+                    const Problem& problem, const std::vector<StreamInfo>& streams) {
+  constexpr const char* kConditions =
+      "`with: SENSOR` or `without: SENSOR`, or `from_s` and `to_s`, times in s";
+  constexpr double kMaxTime_s = 9.2e9;
+  internal::ExpectName(name, entry, "a segment");
+  entry.ExpectMap("{with: SENSOR}, or {from_s: 10, to_s: 30}");
+  Segment segment{.name = name};
+  const auto with_node = entry.Find("with"), without_node = entry.Find("without");
+  const auto first = entry.Find("from_s"), last = entry.Find("to_s");
+  entry.RejectUnread();
+  if (with_node && without_node) {
+    entry.Fail("a segment cannot have `with` and `without`", kConditions);
+  }
+  if (!with_node && !without_node && !first && !last) {
+    entry.Fail("a segment needs a condition", kConditions);
+  }
+  if (first) segment.first = TimestampFromSeconds(first->Number(-kMaxTime_s, kMaxTime_s));
+  if (last) segment.last = TimestampFromSeconds(last->Number(-kMaxTime_s, kMaxTime_s));
+  if (segment.first > segment.last)
+    last->Fail("the segment ends before it begins", "at least from_s");
+  if (!with_node && !without_node) return segment;
+  const Node& sensor = with_node ? *with_node : *without_node;
+  const int index = problem.FindSensor(sensor.Text());
+  if (index < 0) {
+    sensor.Fail("sensor '" + sensor.Text() + "' does not exist", "a name from `sensors`",
+                Nearest(sensor.Text(), NamesOf(problem.sensors)));
+  }
+  const SensorBinding& binding = problem.sensors[static_cast<std::size_t>(index)];
+  segment.sensor = binding.model;
+  segment.stream =
+      internal::FindStream(root.At("sensors").At(binding.name), *binding.model, streams);
+  segment.has_measurement = with_node.has_value();
+  return segment;
+}
+
 std::vector<Segment> ReadSegments(const Node& root, const Problem& problem,
                                   const std::vector<StreamInfo>& streams) {
   std::vector<Segment> segments;
@@ -41,22 +78,7 @@ std::vector<Segment> ReadSegments(const Node& root, const Problem& problem,
   if (!evaluate) return segments;
   if (const auto list = evaluate->Find("segments")) {
     for (const auto& [name, entry] : list->Entries()) {
-      internal::ExpectName(name, entry, "a segment");
-      const auto with_node = entry.Find("with"), without_node = entry.Find("without");
-      if (with_node.has_value() == without_node.has_value()) {
-        entry.Fail("a segment needs exactly one condition", "`with: SENSOR` or `without: SENSOR`");
-      }
-      const Node& sensor = with_node ? *with_node : *without_node;
-      const int index = problem.FindSensor(sensor.Text());
-      if (index < 0) {
-        sensor.Fail("sensor '" + sensor.Text() + "' does not exist", "a name from `sensors`",
-                    Nearest(sensor.Text(), NamesOf(problem.sensors)));
-      }
-      const SensorBinding& binding = problem.sensors[static_cast<std::size_t>(index)];
-      const int stream =
-          internal::FindStream(root.At("sensors").At(binding.name), *binding.model, streams);
-      segments.push_back({name, stream, with_node.has_value(), binding.model});
-      entry.RejectUnread();
+      segments.push_back(ReadSegment(name, entry, root, problem, streams));
     }
   }
   evaluate->Declare("truth_sigma");

@@ -49,13 +49,15 @@ struct EstimatorSpec {
   int accepted_by = -1;
 };
 
-/// Subset of the timestamps for which metrics are computed separately. One sensor has a valid
-/// measurement at either all or none of these timestamps.
+/// Subset of the timestamps for which metrics are computed separately: those within a range of time
+/// at which a sensor has a valid measurement, or has none.
 struct Segment {
   std::string name;
-  int stream = -1;
+  Timestamp first = INT64_MIN, last = INT64_MAX;  ///< both belong to the segment
+  SharedSensor sensor =
+      nullptr;                  ///< sensor of the condition; null: the range is the only condition
+  int stream = -1;              ///< stream of the sensor
   bool has_measurement = true;  ///< true if the sensor has a measurement at all of them
-  SharedSensor sensor;          ///< sensor that determines whether a measurement is valid
 };
 
 /// Treatment of an out-of-sequence frame, which is older than a frame that arrived earlier.

@@ -23,9 +23,11 @@ std::string TimeText(const Frame& frame) {
   return " at t = " + internal::SecondsText(frame.timestamp);
 }
 
-/// Returns whether the frame belongs to the segment. Depending on the segment, the frame must, or
-/// must not, contain a valid measurement of the segment's sensor.
+/// Returns whether the frame lies in the range of the segment and, depending on the segment,
+/// contains, or does not contain, a valid measurement of a sensor.
 bool IsInSegment(const Segment& segment, const Frame& frame) {
+  if (frame.timestamp < segment.first || frame.timestamp > segment.last) return false;
+  if (segment.sensor == nullptr) return true;
   const auto is_valid = [&](const Measurement& m) {
     return m.stream == segment.stream &&
            segment.sensor->Valid({m.values.data(), m.known.data()}) == Status::kOk;

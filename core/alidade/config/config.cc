@@ -284,7 +284,10 @@ std::unique_ptr<ConfigTree>* Descend(ConfigTree* node, const Step& step, const P
   const std::string& path = PathOf(*node);
   if (node->kind != (is_map_key ? Node::Kind::kMap : Node::Kind::kList)) {
     FailAt(place, dotted, Quoted(path) + (is_map_key ? " is not a map" : " is not a list"),
-           is_map_key ? "a map before each key" : "a list before each index");
+           !is_map_key ? "a list before each index"
+           : node->kind == Node::Kind::kList
+               ? "an index of the list, as in " + path + "[0]"
+               : "the whole map, as in " + path + "={" + step.name + ": VALUE}");
   }
   auto& children = node->children;
   if (!is_map_key) {

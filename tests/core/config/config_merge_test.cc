@@ -99,7 +99,9 @@ TEST(ConfigSet, ValueIsReadStrictly) {
 
 TEST(ConfigSet, KeyPathMustFitTheTree) {
   EXPECT_EQ(SetError("a.t.x", "1"),
-            "--set a.t.x: 'a.t' is not a map; expected a map before each key");
+            "--set a.t.x: 'a.t' is not a map; expected the whole map, as in a.t={x: VALUE}");
+  EXPECT_EQ(SetError("a.b.x", "1"),
+            "--set a.b.x: 'a.b' is not a map; expected an index of the list, as in a.b[0]");
   EXPECT_EQ(SetError("a[0]", "1"),
             "--set a[0]: 'a' is not a list; expected a list before each index");
   EXPECT_EQ(SetError("a.b[2]", "1"), "--set a.b[2]: 'a.b' has 2 items, numbered from 0");

@@ -27,10 +27,8 @@ const EstimatorCapabilities& CapabilitiesOf(const PluginEntry& entry) {
   return capabilities != nullptr ? *capabilities : kUndeclared;
 }
 
-/// Returns the index of the stream that the entry of a sensor or an input names. The size of the
-/// stream must be `size`, which is the size of the quantity `wanted_by`.
-int FindStreamOf(const Node& entry, int size, const std::string& wanted_by,
-                 const std::vector<StreamInfo>& streams) {
+/// Returns the index of the stream that the entry of a sensor or an input names.
+std::size_t FindStreamOf(const Node& entry, const std::vector<StreamInfo>& streams) {
   const Node node = entry.At("stream");
   const std::vector<std::string> names = NamesOf(streams);
   const auto found = std::find(names.begin(), names.end(), node.Text());
@@ -38,19 +36,37 @@ int FindStreamOf(const Node& entry, int size, const std::string& wanted_by,
     node.Fail("the source has no stream '" + node.Text() + "'", "one of " + Join(names),
               Nearest(node.Text(), names));
   }
-  const auto index = static_cast<std::size_t>(found - names.begin());
-  if (streams[index].size != size) {
-    node.Fail("stream '" + names[index] + "' has " + std::to_string(streams[index].size) +
-                  (streams[index].size == 1 ? " value" : " values") + " per measurement",
-              std::to_string(size) + ", the size of " + wanted_by);
-  }
-  return static_cast<int>(index);
+  return static_cast<std::size_t>(found - names.begin());
 }
 
-/// Returns the names of the sensors that an estimator lists, in the order of the list. An empty
-/// result means all sensors, in the order of the config.
-std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
-  std::vector<std::string> names;
+/// Returns a text such as `stream 'gyro' has 1 value per measurement`.
+std::string SizeText(const StreamInfo& stream) {
+  return "stream '" + stream.name + "' has " + std::to_string(stream.size) +
+         (stream.size == 1 ? " value" : " values") + " per measurement";
+}
+
+/// Rejects a stream whose size differs from that of the measurement. If a role has the geometry and
+/// the unit of the measurement, its block may be the error, because it can select the size.
+void CheckSize(const Node& sensor, const SensorModel& model, const StreamInfo& stream) {
+  const Space& measurement = model.measurement();
+  const int size = measurement.geometry.ambient;
+  if (stream.size == size) return;
+  const std::string of_model = "the measurement of model '" + model.name() + "'";
+  for (const Space& role : model.roles()) {
+    const bool is_measured = role.geometry == measurement.geometry && role.unit == measurement.unit;
+    const auto node = is_measured ? sensor.At("roles").Find(role.name) : std::nullopt;
+    if (!node) continue;
+    const std::string block = (node->is_map() ? node->At("block") : *node).Text();
+    node->Fail("block '" + block + "' has the geometry " + ToString(role.geometry) + ", so " +
+                   of_model + " has " + std::to_string(size) + " values, but " + SizeText(stream),
+               "another block, or a stream of " + std::to_string(size) + " values");
+  }
+  sensor.At("stream").Fail(SizeText(stream), std::to_string(size) + ", the size of " + of_model);
+}
+
+/// Returns the names of the sensors that an estimator lists, in the order of the list. Returns
+/// nullopt if there is no list: all sensors, in the order of the config.
+std::optional<std::vector<std::string>> ReadSensorList(const Node& entry, const Node& root) {
   const auto list = entry.Find("sensors");
   if (!list) return names;
   std::vector<std::string> known_names;
@@ -374,19 +390,18 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
 
 int FindStream(const Node& sensor, const SensorModel& model,
                const std::vector<StreamInfo>& streams) {
-  const int index = FindStreamOf(sensor, model.measurement().geometry.ambient,
-                                 "the measurement of model '" + model.name() + "'", streams);
-  const int known_size = streams[static_cast<std::size_t>(index)].known;
-  if (known_size != model.known_size()) {
+  const std::size_t index = FindStreamOf(sensor, streams);
+  const StreamInfo& stream = streams[index];
+  CheckSize(sensor, model, stream);
+  if (stream.known != model.known_size()) {
     sensor.At("stream").Fail(
-        "stream '" + streams[static_cast<std::size_t>(index)].name + "' has " +
-            std::to_string(known_size) + (known_size == 1 ? " known number" : " known numbers") +
-            " per measurement",
+        "stream '" + stream.name + "' has " + std::to_string(stream.known) +
+            (stream.known == 1 ? " known number" : " known numbers") + " per measurement",
         std::to_string(model.known_size()) + " for model '" + model.name() + "'" +
             (model.known_size() > 0 ? ": " + Join(ColumnNames(model.known().name, model.known()))
                                     : std::string()));
   }
-  return index;
+  return static_cast<int>(index);
 }
 
 void CheckStreams(const Node& root, const Problem& problem,
@@ -397,9 +412,12 @@ void CheckStreams(const Node& root, const Problem& problem,
   for (const MotionBinding& motion : problem.motions) {
     if (!motion.model->has_input()) continue;
     const Space& input = motion.model->input();
-    FindStreamOf(root.At("state").At(motion.name).At("input"), input.geometry.ambient,
-                 "the control input '" + input.name + "' of model '" + motion.model->name() + "'",
-                 streams);
+    const Node node = root.At("state").At(motion.name).At("input");
+    const StreamInfo& stream = streams[FindStreamOf(node, streams)];
+    if (stream.size == input.geometry.ambient) continue;
+    node.At("stream").Fail(SizeText(stream), std::to_string(input.geometry.ambient) +
+                                                 ", the size of the control input '" + input.name +
+                                                 "' of model '" + motion.model->name() + "'");
   }
 }
 

@@ -238,7 +238,9 @@ std::optional<Finding> TestPrior(const InnovationView& view) {
   constexpr double kFalseAlarm = 1e-6, kMaxRatio = 16.0;
   double count = 0.0, largest = 0.0;
   for (std::size_t i = 0; i < view.size() && view.frame(i) < kFirstFrames; ++i, ++count) {
-    largest = std::max(largest, view.nis(i));
+    // A rejection does not change the prior. If it suits the next measurement, this is an outlier.
+    const bool is_outlier = !view.is_accepted(i) && i + 1 < view.size() && view.is_accepted(i + 1);
+    if (!is_outlier) largest = std::max(largest, view.nis(i));
   }
   if (count == 0.0) return {};
   const int dof = view.series().dof;

@@ -300,6 +300,20 @@ TEST(Diagnose, FindsAPriorThatIsFarOff) {
   EXPECT_EQ(DiagnoseOne(series).front().kind, FindingKind::kPriorFar) << "it explains the others";
 }
 
+// A rejected measurement does not change the state, so a prior that is far off rejects the next one
+// too.
+TEST(Diagnose, DoesNotTakeAFirstOutlierForAPriorThatIsFarOff) {
+  const auto series_of = [](int rejected) {
+    return MakeSeries(1, 100, [=](Sample& s, int i, std::mt19937&) {
+      if (i >= rejected) return;
+      s.u[0] += 40.0;
+      s.outcome = Outcome::kGated;
+    });
+  };
+  EXPECT_FALSE(Has(series_of(1), FindingKind::kPriorFar));
+  EXPECT_TRUE(Has(series_of(10), FindingKind::kPriorFar));
+}
+
 // The quantile of chi-square for a false alarm of 1e-6 corresponds to 5.1 sigma. The median of NIS
 // increases this limit, but at most by the factor 4.
 TEST(Diagnose, ReportsThePriorOnlyIfTheFirstInnovationsAreLargerThanTheOthers) {

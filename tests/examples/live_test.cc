@@ -77,5 +77,22 @@ estimators:
   EXPECT_NE(refusal("deep").find("estimators.deep"), std::string::npos) << refusal("deep");
 }
 
+TEST(MakeFilter, RefusesAnInvariantError) {
+  const Config config = Example("34_invariant_error/config.yaml");
+  const PluginHost host;
+  EXPECT_NO_THROW(MakeFilter(config, host, "ekf"));
+  try {
+    MakeFilter(config, host, "invariant");
+    FAIL() << "no error";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kBadConfig);
+    const std::string text = e.what();
+    EXPECT_NE(text.find("estimators.invariant.invariant_error: a filter for live use cannot have "
+                        "an invariant error; remove this key"),
+              std::string::npos)
+        << text;
+  }
+}
+
 }  // namespace
 }  // namespace alidade

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <exception>
 #include <new>
+#include <optional>
 
 #include "alidade/base/text.h"
 #include "alidade/config/tree.h"
@@ -68,7 +69,8 @@ void CheckSize(const Node& sensor, const SensorModel& model, const StreamInfo& s
 /// nullopt if there is no list: all sensors, in the order of the config.
 std::optional<std::vector<std::string>> ReadSensorList(const Node& entry, const Node& root) {
   const auto list = entry.Find("sensors");
-  if (!list) return names;
+  if (!list) return std::nullopt;
+  std::vector<std::string> names;
   std::vector<std::string> known_names;
   for (const auto& [name, sensor] : root.At("sensors").Entries()) known_names.push_back(name);
   for (const Node& item : list->Items()) {
@@ -82,8 +84,6 @@ std::optional<std::vector<std::string>> ReadSensorList(const Node& entry, const 
     }
     names.push_back(name);
   }
-  if (names.empty())
-    list->Fail("the list is empty; add a sensor, or remove this key to use all sensors");
   return names;
 }
 
@@ -356,7 +356,7 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
     CheckOverrides(*overrides, config.root(), merged.root());
     spec.overrides = overrides->ToYaml();
   }
-  const std::vector<std::string> sensor_names = ReadSensorList(entry, merged.root());
+  const std::optional<std::vector<std::string>> sensor_names = ReadSensorList(entry, merged.root());
   const auto use = entry.Find("use");
   if (use && use->is_map()) use->Declare("accepted_by");
   const auto invariant_error = entry.Find("invariant_error");

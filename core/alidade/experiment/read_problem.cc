@@ -566,7 +566,7 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
 }
 
 /// Returns the problem with only the named sensors, in this order, and the state entries that these
-/// sensors use.
+/// sensors use; without sensors, all state entries.
 Problem SelectSensors(Problem problem, const std::vector<std::string>& names) {
   std::vector<SensorBinding> sensors;
   std::vector<std::string> used_entries;
@@ -579,6 +579,7 @@ Problem SelectSensors(Problem problem, const std::vector<std::string>& names) {
       if (role.block >= 0) used_entries.push_back(problem.layout[role.block].owner);
     }
   }
+  if (sensors.empty()) used_entries = NamesOf(problem.motions);
   Problem selected;
   selected.initial_time_s = problem.initial_time_s;
   selected.landmarks = std::move(problem.landmarks);
@@ -633,7 +634,6 @@ std::vector<double> ReadBlockValue(const Node& node, const Space& space) {
   return value;
 }
 
-SharedMotion CreateStateModel(const std::string& model, const Node& entry, const PluginHost& host) {
 std::map<std::string, std::string> BoundGeometries(const Node& roles, const StateLayout& blocks) {
   std::map<std::string, std::string> geometries;
   for (const auto& [role, node] : roles.Entries()) {
@@ -644,13 +644,14 @@ std::map<std::string, std::string> BoundGeometries(const Node& roles, const Stat
   return geometries;
 }
 
+SharedMotion CreateStateModel(const std::string& model, const Node& entry, const PluginHost& host) {
   if (model == kFormula) return internal::CreateFormulaMotion(entry);
   if (model == kLinear) return internal::CreateLinearMotion(entry);
   return host.CreateMotion(model, entry);
 }
 
 Problem ReadProblem(const Node& root, const PluginHost& host,
-                    const std::vector<std::string>& sensor_names) {
+                    const std::optional<std::vector<std::string>>& sensor_names) {
   Problem problem;
   constexpr const char* kState = "NAME: {model: constant, initial: {value: {mean: 0, sigma: 1}}}";
   const Node state = root.At("state", "a run", kState);
@@ -675,7 +676,7 @@ Problem ReadProblem(const Node& root, const PluginHost& host,
   constexpr double kMaxInitialTime = 4.6e9;  // two timestamps may differ by twice this limit
   if (const auto start = root.Find("initial_time_s"))
     problem.initial_time_s = start->Number(-kMaxInitialTime, kMaxInitialTime);
-  if (!sensor_names.empty()) problem = SelectSensors(std::move(problem), sensor_names);
+  if (sensor_names) problem = SelectSensors(std::move(problem), *sensor_names);
   const auto observes_landmarks = [](const SensorBinding& sensor) {
     return sensor.model->has_landmark();
   };

@@ -14,20 +14,21 @@ namespace alidade {
 
 /// Reads `state`, `sensors`, `landmarks`, `camera` and `initial_time_s` of the root of a config.
 /// `sensor_names` selects the sensors, in this order, and the state entries that these sensors use.
-/// If `sensor_names` is empty, reads all sensors and state entries. Errors: kBadConfig with the
-/// place and a remedy, and kPlugin.
+/// Without sensors, all state entries are read, and are only predicted. If `sensor_names` is
+/// missing, reads all sensors and state entries. Errors: kBadConfig with the place and a remedy,
+/// and kPlugin.
 Problem ReadProblem(const Node& root, const PluginHost& host,
-                    const std::vector<std::string>& sensor_names);
+                    const std::optional<std::vector<std::string>>& sensor_names);
 
 /// Creates the motion model `model` of a state entry: that of a plugin, or of the equations in the
 /// entry. Errors: kBadConfig and kPlugin.
 SharedMotion CreateStateModel(const std::string& model, const Node& entry, const PluginHost& host);
 
-/// Reads a value of the space: a number or a list of numbers. A unit quaternion is a list
-/// Returns the geometry of the block that each role of the map `roles` is bound to. Omits roles whose
-/// block does not exist, and those of landmarks.
+/// Returns the geometry of the block that each role of the map `roles` is bound to. Omits roles
+/// whose block does not exist, and those of landmarks.
 std::map<std::string, std::string> BoundGeometries(const Node& roles, const StateLayout& blocks);
 
+/// Reads a value of the space: a number or a list of numbers. A unit quaternion is a list
 /// [w, x, y, z], a map {w: , x: , y: , z: }, or {rpy_deg: [ROLL, PITCH, YAW]}. Error: kBadConfig,
 /// also for a unit vector or unit quaternion whose length differs from 1 by more than
 /// kUnitTolerance.

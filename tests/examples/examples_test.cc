@@ -13,6 +13,7 @@
 #include "alidade/base/number_text.h"
 #include "alidade/experiment/run.h"
 #include "alidade/record/simulate.h"
+#include "support/example_runs.h"
 #include "support/temporary_folder.h"
 
 namespace alidade {
@@ -26,54 +27,12 @@ constexpr bool kHasCeres = false;
 constexpr bool kHasCeres = true;
 #endif
 
-using Settings = std::vector<std::pair<std::string, std::string>>;
+using testing::Means;
+using testing::RunExample;
+using testing::Settings;
+using testing::Sweep;
 
-/// Returns the plugins of the build. They are loaded once for all runs, because no example names
-/// other plugins.
-const PluginHost& Host() {
-  static const PluginHost host(std::vector<std::filesystem::path>{});
-  return host;
-}
-
-RunResult RunExample(const std::string& name, const Settings& settings) {
-  Config config = Config::FromFile(kExamples / name / "config.yaml");
-  for (const auto& [key, value] : settings) config.Set(key, value, "--set");
-  Experiment experiment = BuildExperiment(config, Host());
-  return Run(experiment, {});
-}
-
-/// Means over the runs of the seeds 1001 to 1200 that did not diverge.
-struct Means {
-  int diverged = 0;  ///< number of runs that diverged
-  int lost = 0;      ///< number of runs with the verdict `lost`
-  std::map<std::string, double> metrics;
-  double operator[](const std::string& key) const { return metrics.at(key); }
-};
-
-std::map<std::string, Means> Sweep(const std::string& name, const Settings& settings = {}) {
-  std::map<std::string, Means> means;
-  std::map<std::string, int> used;
-  for (int seed = 1001; seed <= 1200; ++seed) {
-    Settings with_seed = settings;
-    with_seed.emplace_back("source.seed", std::to_string(seed));
-    const RunResult run = RunExample(name, with_seed);
-    EXPECT_EQ(run.status, RunStatus::kOk) << name << " seed " << seed << ": " << run.reason;
-    for (const EstimatorResult& result : run.estimators) {
-      Means& mean = means[result.name];
-      if (result.diverged) {
-        ++mean.diverged;
-        continue;
-      }
-      ++used[result.name];
-      mean.lost += result.verdict.state == VerdictState::kLost ? 1 : 0;
-      for (const auto& [key, value] : result.metrics) mean.metrics[key] += value;
-    }
-  }
-  for (auto& [estimator, mean] : means) {
-    for (auto& [key, value] : mean.metrics) value /= used[estimator];
-  }
-  return means;
-}
+const PluginHost& Host() { return testing::ExampleHost(); }
 
 bool HasEvent(const EstimatorResult& result, EventKind kind) {
   return std::any_of(result.events.begin(), result.events.end(),

@@ -63,6 +63,8 @@ TEST_F(RecordedRobots, ARobotIsComposedFromItsRawFiles) {
   EXPECT_LE(ekf.metrics.at("rmse:robot.position"), 0.20);
   EXPECT_LE(rts.metrics.at("rmse:robot.position"), 0.125);
   EXPECT_NE(ekf.verdict.state, VerdictState::kLost);
+  EXPECT_NEAR(ekf.metrics.at("nees.mean:robot"), 0.85, 0.05 * 0.85);
+  EXPECT_NEAR(rts.metrics.at("nees.mean:robot"), 0.74, 0.05 * 0.74);
   // The large outliers among the 121 fixes are rejected, and nothing else.
   EXPECT_EQ(ekf.counts.at("gated:gps"), 4);
   EXPECT_EQ(ekf.counts.at("accepted:gps"), 117);
@@ -73,7 +75,10 @@ TEST_F(RecordedRobots, ARobotAmongRadioBeaconsEstimatesTheirBiases) {
   RunOn("37_plaza_ranges", "plaza2", run);
   if (IsSkipped()) return;
   const EstimatorResult& ekf = Named(run, "ekf");
-  EXPECT_LE(ekf.metrics.at("rmse:robot.position"), 1.05);
+  EXPECT_LE(ekf.metrics.at("rmse:robot.position"), 1.05 * 0.79);
+  EXPECT_LE(ekf.metrics.at("rmse:robot.heading"), 1.05 * 2.7 * std::numbers::pi / 180.0);
+  EXPECT_NEAR(ekf.metrics.at("nees.mean:robot"), 1.04, 0.05 * 1.04);
+  EXPECT_LE(Named(run, "rts").metrics.at("rmse:robot.position"), 1.05 * 0.56);
   EXPECT_NEAR(Named(run, "odometry").metrics.at("rmse:robot.position"), 31.7, 1.0);
   for (const char* name : {"ekf", "rts"}) {
     EXPECT_NE(Named(run, name).verdict.state, VerdictState::kLost) << name;

@@ -18,8 +18,8 @@
 #include "alidade/config/config.h"
 #include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/short_forms.h"
-#include "alidade/formula/formula_name.h"
 #include "alidade/model/geometry.h"
+#include "alidade/plugin/built_in_models.h"
 #include "alidade/plugin/plugin_host.h"
 #include "sensor_schedule.h"
 

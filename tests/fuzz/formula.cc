@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "alidade/config/config.h"
-#include "alidade/formula/formula_motion.h"
-#include "alidade/formula/formula_sensor.h"
+#include "alidade/formula/models_in_config.h"
 #include "alidade/state/element_names.h"
 #include "fuzz.h"
 

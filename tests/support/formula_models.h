@@ -6,10 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/formula/formula_motion.h"
-#include "alidade/formula/formula_sensor.h"
-#include "alidade/formula/linear_motion.h"
-#include "alidade/formula/linear_sensor.h"
+#include "alidade/formula/models_in_config.h"
 #include "alidade/state/element_names.h"
 #include "alidade/testing/jacobians.h"
 #include "support/config_text.h"
@@ -49,7 +46,7 @@ inline SharedMotion FormulaMotionOf(const std::string& yaml) {
 
 inline SharedSensor LinearSensorOf(const std::string& yaml, const std::vector<Space>& roles) {
   const Config config = Read(yaml);
-  SharedSensor sensor = internal::CreateLinearSensor(config.root(), roles);
+  SharedSensor sensor = internal::CreateLinearSensor(config.root(), roles, false);
   config.root().RejectUnread();
   return sensor;
 }

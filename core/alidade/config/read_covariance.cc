@@ -2,6 +2,7 @@
 #include "alidade/config/read_covariance.h"
 
 #include <cmath>
+#include <limits>
 
 #include "alidade/base/number_text.h"
 #include "alidade/state/dense_algebra.h"
@@ -52,6 +53,29 @@ void CheckPositive(const Node& node, const Eigen::MatrixXd& covariance) {
             "a covariance");
 }
 
+/// Returns L of A = L L', n x n row-major. Computes L column by column. If a pivot is zero within
+/// rounding errors, sets its column to zero and `is_singular` to true.
+std::vector<double> RootOf(const std::vector<double>& a, int size, bool& is_singular) {
+  const auto n = static_cast<std::size_t>(size);
+  const double rounding = 64.0 * static_cast<double>(n) * std::numeric_limits<double>::epsilon();
+  std::vector<double> l(n * n, 0.0);
+  for (std::size_t j = 0; j < n; ++j) {
+    const auto reduced = [&](std::size_t i) {
+      double sum = a[i * n + j];
+      for (std::size_t k = 0; k < j; ++k) sum -= l[i * n + k] * l[j * n + k];
+      return sum;
+    };
+    const double pivot = reduced(j);
+    if (!(pivot > rounding * a[j * n + j])) {
+      is_singular = true;
+      continue;
+    }
+    l[j * n + j] = std::sqrt(pivot);
+    for (std::size_t i = j + 1; i < n; ++i) l[i * n + j] = reduced(i) / l[j * n + j];
+  }
+  return l;
+}
+
 }  // namespace
 
 std::vector<double> ReadCovariance(const Node& node, int size) {
@@ -76,6 +100,32 @@ std::vector<double> ReadCovariance(const Node& node, int size) {
   matrix = (0.5 * (matrix + matrix.transpose())).eval();
   CheckPositive(node, matrix);
   return {matrix.data(), matrix.data() + matrix.size()};
+}
+
+std::vector<double> ReadSqrtCovariance(const Node& node, int size) {
+  bool is_singular = false;
+  return RootOf(ReadCovariance(node, size), size, is_singular);
+}
+
+std::vector<double> ReadSqrtR(const Node& node, int size) {
+  bool is_singular = false;
+  std::vector<double> root = RootOf(ReadCovariance(node, size), size, is_singular);
+  if (is_singular) {
+    node.Fail("is singular, so the measurement would have no noise in one direction",
+              "a positive definite covariance");
+  }
+  return root;
+}
+
+void ExpectSigma(const Node& node, double sigma) {
+  if (sigma < 0.0) node.Fail("a standard deviation is negative", "a value >= 0");
+}
+
+std::vector<double> ReadSigmas(const Node& node, int size, const std::string& unit) {
+  std::vector<double> sigmas = node.Numbers(-1, unit);
+  RepeatTo(size, node, sigmas);
+  for (const double sigma : sigmas) ExpectSigma(node, sigma);
+  return sigmas;
 }
 
 }  // namespace alidade::internal

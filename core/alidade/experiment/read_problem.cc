@@ -19,10 +19,7 @@
 #include "alidade/estimation/time_offset.h"
 #include "alidade/experiment/defect_node.h"
 #include "alidade/experiment/read_landmarks.h"
-#include "alidade/formula/formula_motion.h"
-#include "alidade/formula/formula_sensor.h"
-#include "alidade/formula/linear_motion.h"
-#include "alidade/formula/linear_sensor.h"
+#include "alidade/formula/models_in_config.h"
 #include "alidade/plugin/built_in_models.h"
 #include "alidade/state/element_names.h"
 #include "alidade/state/quaternion_sign.h"
@@ -30,8 +27,6 @@
 namespace alidade {
 namespace {
 
-using internal::kFormula;
-using internal::kLinear;
 using internal::NamesOf;
 
 /// Calls `add`. If `add` throws, throws the error again with the place of the entry.
@@ -109,15 +104,8 @@ Eigen::MatrixXd ReadCovariance(const Node& node, const Space& space) {
     const std::vector<double> values = internal::ReadCovariance(*covariance, size);
     return Eigen::Map<const Eigen::MatrixXd>(values.data(), size, size);
   }
-  std::vector<double> values = sigma->Numbers(-1, SigmaUnit(space));
-  if (values.size() == 1) values.assign(static_cast<std::size_t>(size), values[0]);
-  if (values.size() != static_cast<std::size_t>(size)) {
-    sigma->Fail("the list has " + std::to_string(values.size()) + " numbers",
-                std::to_string(size) + ", or one number for all elements");
-  }
-  const Eigen::VectorXd sigmas = Eigen::Map<const Eigen::VectorXd>(values.data(), size);
-  if (sigmas.minCoeff() < 0.0) sigma->Fail("a standard deviation is negative", "numbers >= 0");
-  return sigmas.cwiseAbs2().asDiagonal();
+  const std::vector<double> sigmas = internal::ReadSigmas(*sigma, size, SigmaUnit(space));
+  return Eigen::Map<const Eigen::VectorXd>(sigmas.data(), size).cwiseAbs2().asDiagonal();
 }
 
 /// Reads a list of block names, such as `consider: [depth]`. Rejects a name that `accepted` does
@@ -262,18 +250,10 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
 /// Reads one standard deviation, or one for each of `size` elements. Returns the square root of the
 /// covariance.
 std::vector<double> ReadSqrtDiagonal(const Node& node, int size) {
-  const auto n = static_cast<std::size_t>(size);
-  std::vector<double> sigma = node.Numbers();
-  if (sigma.size() == 1) sigma.assign(n, sigma[0]);
-  if (sigma.size() != n) {
-    node.Fail("the list has " + std::to_string(sigma.size()) + " numbers",
-              std::to_string(size) + ", or one number for all elements");
-  }
+  const std::vector<double> sigmas = internal::ReadSigmas(node, size);
+  const std::size_t n = sigmas.size();
   std::vector<double> root(n * n, 0.0);
-  for (std::size_t i = 0; i < n; ++i) {
-    if (sigma[i] < 0.0) node.Fail("a standard deviation is negative", "numbers >= 0");
-    root[i * n + i] = sigma[i];
-  }
+  for (std::size_t i = 0; i < n; ++i) root[i * n + i] = sigmas[i];
   return root;
 }
 
@@ -489,25 +469,11 @@ RobustLoss ReadLoss(const Node& node) {
   return *loss;
 }
 
-/// Creates a sensor from the equations in its entry. Its roles have the geometries, units and
-/// elements of the blocks to which they are bound.
-SharedSensor CreateFromEquations(const std::string& model, const Node& entry, const Node& roles,
-                                 const Problem& problem) {
-  std::vector<Space> bound_roles;
-  bool has_landmark = false;
+/// Rejects roles whose blocks do not exist.
+void ExpectBlocks(const Node& roles, const Problem& problem) {
   for (const auto& [name, node] : roles.Entries()) {
-    if (name == "landmark") {
-      if (model == kLinear) node.Fail("the model linear has no landmarks", "the model formula");
-      has_landmark = true;
-      continue;
-    }
-    const Node block = node.is_map() ? node.At("block", "a role") : node;
-    bound_roles.push_back(problem.layout[FindBlock(block, problem)].space);
-    bound_roles.back().name = name;
-    bound_roles.back().flags = 0;
+    if (name != "landmark") FindBlock(node.is_map() ? node.At("block", "a role") : node, problem);
   }
-  return model == kLinear ? internal::CreateLinearSensor(entry, bound_roles)
-                          : internal::CreateFormulaSensor(entry, bound_roles, has_landmark);
 }
 
 /// Rejects a role that the model does not have.
@@ -531,10 +497,9 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
   const Node roles =
       entry.At("roles", "sensor '" + name + "'", "roles: ENTRY, or roles: {ROLE: ENTRY.BLOCK}");
   roles.ExpectMap("{ROLE: ENTRY.BLOCK}");
+  if (internal::HasEquationsInConfig(model_name)) ExpectBlocks(roles, problem);
   const SharedSensor model =
-      internal::HasEquationsInConfig(model_name)
-          ? CreateFromEquations(model_name, entry, roles, problem)
-          : host.CreateSensor(model_name, entry, {}, BoundGeometries(roles, problem.layout));
+      CreateBoundSensor(model_name, entry, BoundRoles(roles, problem.layout), host);
   if (const auto loss = entry.Find("loss")) options.loss = ReadLoss(*loss);
   RejectUnknownRoles(roles, *model);
   OwnedStateReader owned_states(name, entry, roles, *model);
@@ -634,20 +599,35 @@ std::vector<double> ReadBlockValue(const Node& node, const Space& space) {
   return value;
 }
 
-std::map<std::string, std::string> BoundGeometries(const Node& roles, const StateLayout& blocks) {
-  std::map<std::string, std::string> geometries;
-  for (const auto& [role, node] : roles.Entries()) {
+std::vector<Space> BoundRoles(const Node& roles, const StateLayout& blocks) {
+  std::vector<Space> bound;
+  for (const auto& [name, node] : roles.Entries()) {
     const std::optional<Node> block = node.is_map() ? node.Find("block") : node;
     const BlockId id = block ? blocks.Find(block->Text()) : -1;
-    if (id >= 0) geometries[role] = ToString(blocks[id].geometry());
+    if (id < 0) continue;
+    bound.push_back(blocks[id].space);
+    bound.back().name = name;
   }
-  return geometries;
+  return bound;
 }
 
 SharedMotion CreateStateModel(const std::string& model, const Node& entry, const PluginHost& host) {
-  if (model == kFormula) return internal::CreateFormulaMotion(entry);
-  if (model == kLinear) return internal::CreateLinearMotion(entry);
+  if (const auto* const in_config = internal::FindModelInConfig(model))
+    return in_config->create_motion(entry);
   return host.CreateMotion(model, entry);
+}
+
+SharedSensor CreateBoundSensor(const std::string& model, const Node& entry,
+                               std::vector<Space> bound_roles, const PluginHost& host) {
+  if (const auto* const in_config = internal::FindModelInConfig(model)) {
+    for (Space& role : bound_roles) role.flags = 0;
+    const auto roles = entry.Find("roles");
+    const bool has_landmark = roles && roles->is_map() && roles->Find("landmark");
+    return in_config->create_sensor(entry, bound_roles, has_landmark);
+  }
+  std::map<std::string, std::string> geometries;
+  for (const Space& role : bound_roles) geometries[role.name] = ToString(role.geometry);
+  return host.CreateSensor(model, entry, {}, geometries);
 }
 
 Problem ReadProblem(const Node& root, const PluginHost& host,

@@ -24,9 +24,15 @@ Problem ReadProblem(const Node& root, const PluginHost& host,
 /// entry. Errors: kBadConfig and kPlugin.
 SharedMotion CreateStateModel(const std::string& model, const Node& entry, const PluginHost& host);
 
-/// Returns the geometry of the block that each role of the map `roles` is bound to. Omits roles
-/// whose block does not exist, and those of landmarks.
-std::map<std::string, std::string> BoundGeometries(const Node& roles, const StateLayout& blocks);
+/// Returns the block that each role of the map `roles` is bound to, with the name of the role.
+/// Omits roles whose block does not exist, and those of landmarks.
+std::vector<Space> BoundRoles(const Node& roles, const StateLayout& blocks);
+
+/// Creates the sensor model `model` of a sensor entry: that of the equations in the entry, or of a
+/// plugin, whose variant the geometries of the roles select. `bound_roles` are the blocks that the
+/// key `roles` binds, with the names of the roles. Errors: kBadConfig and kPlugin.
+SharedSensor CreateBoundSensor(const std::string& model, const Node& entry,
+                               std::vector<Space> bound_roles, const PluginHost& host);
 
 /// Reads a value of the space: a number or a list of numbers. A unit quaternion is a list
 /// [w, x, y, z], a map {w: , x: , y: , z: }, or {rpy_deg: [ROLL, PITCH, YAW]}. Error: kBadConfig,

@@ -247,11 +247,13 @@ void ExpandSensor(ConfigTree& entry, const PluginHost& host, const StateLayout& 
     BindEachBlock(*roles, offered, ChildMap(entry, "H"));
   }
   const bool has_equations = internal::HasEquationsInConfig(model_name->text);
-  if (has_equations || roles->kind != Node::Kind::kMap) return;
-  // The geometries of the blocks select the variant of the model.
-  const SharedSensor model =
-      host.CreateSensor(model_name->text, Node(&entry), {}, BoundGeometries(Node(roles), blocks));
-  if (has_names) BindRoles(*roles, *model, offered);
+  if (roles->kind != Node::Kind::kMap) return;
+  const std::vector<Space> bound = BoundRoles(Node(roles), blocks);
+  const std::size_t landmarks = Child(*roles, "landmark") == nullptr ? 0 : 1;
+  // The reader reports a block that does not exist.
+  if (has_equations && bound.size() + landmarks < roles->children.size()) return;
+  const SharedSensor model = CreateBoundSensor(model_name->text, Node(&entry), bound, host);
+  if (has_names && !has_equations) BindRoles(*roles, *model, offered);
   FillFromModel(entry, *model);
 }
 

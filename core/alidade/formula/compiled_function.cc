@@ -43,11 +43,13 @@ void DifferentiatePlus(const Geometry& geometry, const double* x, double* t) {
   });
 }
 
-/// Computes c = a b, row-major with the given distances between rows.
+/// Row-major matrix, with the distance between its rows.
 struct Matrix {
   const double* data;
   int rows, columns, stride;
 };
+
+/// Computes c = a b.
 void Multiply(const Matrix& a, const Matrix& b, double* c, int stride) {
   for (int i = 0; i < a.rows; ++i) {
     for (int j = 0; j < b.columns; ++j) {
@@ -178,17 +180,6 @@ Status CompiledFunction::Evaluate(const double* const* x, double* y, double* con
   if (jacobians != nullptr) ToTangent(outputs_, results, inputs_, x, ambient, jacobians, strides);
   std::copy(results, result, y);
   return Status::kOk;
-}
-
-void DeclareSpaces(const std::vector<Space>& spaces, int first, const Node& owner, Scope& scope) {
-  for (const Space& space : spaces) {
-    Symbol symbol;
-    symbol.value.geometry = space.geometry.row().number;
-    for (int i = 0; i < space.geometry.ambient; ++i) symbol.value.nodes.push_back(first++);
-    const bool has_names = std::ssize(space.elements) == space.geometry.ambient;
-    if (has_names && !space.elements[0].empty()) symbol.value.elements = space.elements;
-    scope.Declare(space.name, std::move(symbol), owner);
-  }
 }
 
 }  // namespace alidade::internal

@@ -60,8 +60,4 @@ class CompiledFunction {
   std::vector<Condition> conditions_;
 };
 
-/// Declares one name for each space. The first element of the first space is the variable `first`
-/// of the program.
-void DeclareSpaces(const std::vector<Space>& spaces, int first, const Node& owner, Scope& scope);
-
 }  // namespace alidade::internal

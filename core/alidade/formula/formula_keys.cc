@@ -30,8 +30,9 @@ std::vector<std::pair<std::string, Node>> EntriesOf(const Node& entry, const cha
 
 }  // namespace
 
-FormulaKeys::FormulaKeys(const Node& entry)
+FormulaKeys::FormulaKeys(const Node& entry, std::vector<const char*> declarations)
     : entry_(entry),
+      declarations_(std::move(declarations)),
       units_(entry.Find("units")),
       definitions_(EntriesOf(entry, "let", "{NAME: EXPRESSION}")) {
   if (units_) units_->ExpectMap("{NAME: UNIT}");
@@ -91,6 +92,22 @@ std::string FormulaKeys::UnitOf(const std::string& name, const Geometry& geometr
   return unit ? unit->Text() : geometry.is_angle() ? "rad" : "";
 }
 
+void FormulaKeys::DeclareSpaces(const std::vector<Space>& spaces, int first, Scope& scope) const {
+  for (const Space& space : spaces) {
+    scope.Declare(space.name, {VariableOf(space, first)}, PlaceOf(space.name));
+    first += space.geometry.ambient;
+  }
+}
+
+Node FormulaKeys::PlaceOf(const std::string& name) const {
+  for (const char* key : declarations_) {
+    const auto map = entry_.Find(key);
+    const auto node = map && map->is_map() ? map->Find(name) : std::nullopt;
+    if (node) return *node;
+  }
+  return entry_;
+}
+
 void FormulaKeys::AddTo(Scope& scope) const {
   for (const Constant& constant : constants_) {
     Symbol symbol;
@@ -105,6 +122,13 @@ void FormulaKeys::CheckDefinitions(Scope& scope) const {
   for (const auto& [name, node] : definitions_) static_cast<void>(scope.Find(name));
 }
 
+void FormulaKeys::CheckDefinitionsOfConstants() const {
+  Program program(0);
+  Scope scope(program);
+  AddTo(scope);
+  CheckDefinitions(scope);
+}
+
 void FormulaKeys::RejectUnread() const {
   if (units_) units_->RejectUnread();
 }
@@ -114,14 +138,30 @@ Space Concatenated(const std::vector<Space>& spaces, const std::string& name) {
   Space all;
   if (spaces.empty()) return all;
   all.name = name;
+  all.elements = ColumnsOf(spaces);
   for (const Space& space : spaces) {
-    for (const std::string& element : ColumnNames(space.name, space))
-      all.elements.push_back(element);
     if (&space == &spaces[0]) all.unit = space.unit;
     if (space.unit != all.unit) all.unit.clear();
   }
   all.geometry = Geometry::Vector(static_cast<int>(all.elements.size()));
   return all;
+}
+
+std::vector<std::string> ColumnsOf(const std::vector<Space>& spaces) {
+  std::vector<std::string> columns;
+  for (const Space& space : spaces) {
+    for (const std::string& name : ColumnNames(space.name, space)) columns.push_back(name);
+  }
+  return columns;
+}
+
+Value VariableOf(const Space& space, int first) {
+  Value value;
+  value.geometry = space.geometry.row().number;
+  for (int i = 0; i < space.geometry.ambient; ++i) value.nodes.push_back(first + i);
+  const bool has_names = std::ssize(space.elements) == space.geometry.ambient;
+  if (has_names && !space.elements[0].empty()) value.elements = space.elements;
+  return value;
 }
 
 std::vector<Geometry> GeometriesOf(const std::vector<Space>& spaces) {

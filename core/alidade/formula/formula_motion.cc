@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/formula/formula_motion.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,7 +6,9 @@
 #include <utility>
 
 #include "alidade/base/text.h"
-#include "alidade/formula/formula_keys.h"
+#include "alidade/config/read_covariance.h"
+#include "alidade/formula/model_keys.h"
+#include "alidade/formula/models_in_config.h"
 #include "alidade/formula/rate_integrator.h"
 
 namespace alidade::internal {
@@ -108,30 +108,15 @@ class FormulaMotion final : public MotionModel {
 class MotionReader {
  public:
   explicit MotionReader(const Node& entry)
-      : keys_(entry),
-        entry_(entry),
-        blocks_(keys_.ReadSpaces("blocks")),
-        inputs_(keys_.ReadSpaces("inputs")) {
-    const Node node = entry.At("blocks", "a formula", "blocks: {p: [x, y], heading: angle}");
-    if (blocks_.empty() || blocks_.size() > std::size_t{kMaxRoles}) {
-      node.Fail("the model has " + std::to_string(blocks_.size()) + " blocks",
-                "1 to " + std::to_string(kMaxRoles));
-    }
-    input_space_ = Concatenated(inputs_, "input");
+      : motion_(entry, "step: {BLOCK: value after dt}, or rate: {BLOCK: derivative by time}") {
     ReadNoise();
   }
 
   SharedMotion Read() {
     MotionParts parts{{}, {}, {}, ReadSigma()};
-    const auto step = entry_.Find("step"), rate = entry_.Find("rate");
-    if (step.has_value() == rate.has_value()) {
-      rate.value_or(entry_).Fail(
-          "a motion model needs exactly one of `step` and `rate`",
-          "step: {BLOCK: value after dt}, or rate: {BLOCK: derivative by time}");
-    }
-    CompiledFunction function = ReadFunction(step ? *step : *rate, rate.has_value());
+    CompiledFunction function = ReadFunction();
     int terms = 1;
-    if (rate) {
+    if (is_rate_) {
       parts.rate.emplace(std::move(function), blocks_, !inputs_.empty(), is_discrete_);
       terms = parts.rate->terms();
     } else {
@@ -140,7 +125,7 @@ class MotionReader {
     MotionModel::Description& description = parts.description;
     description.name = kFormula;
     description.blocks = blocks_;
-    description.input = input_space_;
+    description.input = motion_.input;
     description.noise_size = static_cast<int>(noises_.size()) * terms;
     description.discrete_noise = is_discrete_;
     int size = description.noise_size;
@@ -174,12 +159,12 @@ class MotionReader {
   /// Returns the geometries of the blocks and of the control input.
   std::vector<Geometry> BlocksAndInput() const {
     std::vector<Geometry> geometries = GeometriesOf(blocks_);
-    if (!inputs_.empty()) geometries.push_back(input_space_.geometry);
+    if (!inputs_.empty()) geometries.push_back(motion_.input.geometry);
     return geometries;
   }
   void DeclareBlocksAndInput(const CompiledFunction& function, Scope& scope) const {
-    DeclareSpaces(blocks_, 0, entry_, scope);
-    if (!inputs_.empty()) DeclareSpaces(inputs_, function.offset(blocks_.size()), entry_, scope);
+    keys_.DeclareSpaces(blocks_, 0, scope);
+    if (!inputs_.empty()) keys_.DeclareSpaces(inputs_, function.offset(blocks_.size()), scope);
   }
 
   CompiledFunction ReadSigma() const {
@@ -190,24 +175,24 @@ class MotionReader {
     for (const Node& node : noise_nodes_) {
       const Value value = ParseExpression(node, scope, 1, "one noise");
       const auto number = function.program().ConstantValue(value.nodes[0]);
-      if (number && *number < 0.0) node.Fail("the standard deviation is negative", "a value >= 0");
+      if (number) ExpectSigma(node, *number);
       function.AddOutput(Geometry::Vector(1), value, node);
     }
     return function;
   }
 
   /// Compiles the values after dt, or the rates. A block without an expression is constant.
-  CompiledFunction ReadFunction(const Node& map, bool is_rate) {
+  CompiledFunction ReadFunction() {
     std::vector<Geometry> geometries = BlocksAndInput();
     const std::size_t noise = geometries.size();
     geometries.push_back(Geometry::Vector(static_cast<int>(noises_.size())));
     // A rate that depends on dt would depend on the division of a step.
-    if (!is_rate) geometries.push_back(Geometry::Vector(1));
+    if (!is_rate_) geometries.push_back(Geometry::Vector(1));
     CompiledFunction function(std::move(geometries), entry_);
     const auto declare = [&](Scope& scope) {
+      if (!is_rate_) scope.Declare("dt", {{{function.offset(noise + 1)}}}, entry_);
       DeclareBlocksAndInput(function, scope);
-      DeclareSpaces(noises_, function.offset(noise), entry_, scope);
-      if (!is_rate) scope.Declare("dt", {{{function.offset(noise + 1)}}}, entry_);
+      keys_.DeclareSpaces(noises_, function.offset(noise), scope);
       keys_.AddTo(scope);
     };
     Scope scope(function.program());
@@ -216,23 +201,24 @@ class MotionReader {
     Scope checked_scope(checked);
     declare(checked_scope);
     keys_.CheckDefinitions(checked_scope);
+    const Node& map = motion_.equation;
     map.ExpectMap("{BLOCK: EXPRESSION}");
     for (std::size_t k = 0; k < blocks_.size(); ++k) {
       Space& block = blocks_[k];
       Value value;
       for (int i = 0; i < block.geometry.ambient; ++i) {
-        value.nodes.push_back(is_rate ? function.program().Constant(0.0) : function.offset(k) + i);
+        value.nodes.push_back(is_rate_ ? function.program().Constant(0.0) : function.offset(k) + i);
       }
       const auto node = map.Find(block.name);
       if (node) {
-        value = is_rate
+        value = is_rate_
                     ? ParseRate(*node, block, function.offset(k), scope)
                     : ParseExpression(*node, scope, block.geometry.ambient, "block " + block.name);
-        block.doc = (is_rate ? "d" + block.name + "/dt = " : block.name + "(t + dt) = ") +
+        block.doc = (is_rate_ ? "d" + block.name + "/dt = " : block.name + "(t + dt) = ") +
                     ExpressionText(*node);
       }
-      function.AddOutput(is_rate ? Geometry::Vector(block.geometry.ambient) : block.geometry, value,
-                         node.value_or(map));
+      function.AddOutput(is_rate_ ? Geometry::Vector(block.geometry.ambient) : block.geometry,
+                         value, node.value_or(map));
     }
     map.RejectUnread();
     return function;
@@ -253,10 +239,13 @@ class MotionReader {
     return CompileQuaternionRate(scope.program(), q, rate);
   }
 
-  FormulaKeys keys_;
-  Node entry_;
-  std::vector<Space> blocks_, inputs_, noises_;
-  Space input_space_;
+  MotionKeys motion_;
+  const Node& entry_ = motion_.entry;
+  const FormulaKeys& keys_ = motion_.keys;
+  std::vector<Space>& blocks_ = motion_.blocks;
+  const std::vector<Space>& inputs_ = motion_.inputs;
+  const bool is_rate_ = motion_.is_rate;
+  std::vector<Space> noises_;
   std::vector<Node> noise_nodes_;
   bool is_discrete_ = false;
 };

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/formula/formula_sensor.h"
-
 #include <algorithm>
 #include <array>
 #include <optional>
 #include <utility>
 
 #include "alidade/base/text.h"
-#include "alidade/formula/formula_keys.h"
-#include "alidade/plugin/config_noise.h"
+#include "alidade/formula/model_keys.h"
+#include "alidade/formula/models_in_config.h"
 #include "alidade/state/element_names.h"
 
 namespace alidade::internal {
@@ -118,26 +116,24 @@ class FormulaSensor final : public SensorModel {
 class SensorReader {
  public:
   SensorReader(const Node& entry, const std::vector<Space>& bound_roles, bool has_landmark)
-      : keys_(entry), entry_(entry), roles_(bound_roles), known_(keys_.ReadSpaces("known")) {
-    for (Space& role : keys_.ReadSpaces("owns", ALIDADE_ROLE_OWNED)) {
-      roles_.push_back(std::move(role));
-    }
-    if (has_landmark) roles_.push_back(ReadLandmark());
-    known_space_ = Concatenated(known_, "known");
+      : sensor_(entry, bound_roles),
+        known_(keys_.ReadSpaces("known")),
+        known_space_(Concatenated(known_, "known")) {
+    if (has_landmark || entry_.Find(kLandmark)) roles_.push_back(ReadLandmark());
   }
 
   SharedSensor Read() {
-    if (roles_.size() > std::size_t{kMaxRoles}) {
-      entry_.Fail("the sensor has " + std::to_string(roles_.size()) + " roles",
-                  "at most " + std::to_string(kMaxRoles));
-    }
     SensorParts parts{{}, ReadPrediction(), {}, {}, {}};
     SensorModel::Description& description = parts.description;
     description.name = kFormula;
     description.roles = roles_;
     description.known = known_space_;
-    description.measurement = Measurement();
-    parts.sigma = ReadSigma(description);
+    description.measurement = sensor_.Measurement();
+    if (const auto root = sensor_.ReadSqrtCovariance()) {
+      description.sqrt_noise = *root;
+    } else {
+      parts.sigma = ReadSigma();
+    }
     parts.validity = ReadValidity();
     description.has_validity = parts.validity.has_value();
     parts.inverse = ReadInverse(description.inverse);
@@ -166,18 +162,17 @@ class SensorReader {
   /// Declares the given spaces and the known numbers, the constants and the definitions. The
   /// elements of `spaces` are the first variables of the program.
   void Declare(const std::vector<Space>& spaces, int known_offset, Scope& scope) const {
-    DeclareSpaces(spaces, 0, entry_, scope);
-    DeclareSpaces(known_, known_offset, entry_, scope);
+    keys_.DeclareSpaces(spaces, 0, scope);
+    keys_.DeclareSpaces(known_, known_offset, scope);
     keys_.AddTo(scope);
   }
-  /// Declares `z`, whose elements are the parts of the measurement.
+  /// Declares `z`, whose elements are the parts of the measurement. Precedes the other names, so
+  /// that an error reports the role that has this name.
   void DeclareMeasurement(int first, Scope& scope) const {
     Symbol symbol;
     for (const Space& part : parts_) {
-      Value value;
-      value.geometry = part.geometry.row().number;
-      for (int i = 0; i < part.geometry.ambient; ++i) value.nodes.push_back(first++);
-      if (!part.elements[0].empty()) value.elements = part.elements;
+      Value value = VariableOf(part, first);
+      first += part.geometry.ambient;
       symbol.value.nodes.insert(symbol.value.nodes.end(), value.nodes.begin(), value.nodes.end());
       symbol.parts.emplace_back(part.name, std::move(value));
     }
@@ -193,9 +188,7 @@ class SensorReader {
     CompiledFunction prediction(WithKnown(GeometriesOf(roles_)), entry_);
     Scope scope(prediction.program());
     Declare(roles_, KnownOffset(prediction), scope);
-    const Node z = entry_.At(kMeasured, "a formula", kExampleZ);
-    z.ExpectMap("{range: norm(p - anchor)}");
-    for (const auto& [name, node] : z.Entries()) {
+    for (const auto& [name, node] : sensor_.Measured(kExampleZ).Entries()) {
       if (!IsIdentifier(name)) {
         node.Fail("'" + name + "' cannot name a part of the measurement",
                   "a name of letters, digits and _");
@@ -213,51 +206,27 @@ class SensorReader {
       prediction.AddOutput(space.geometry, value, node);
       parts_.push_back(std::move(space));
     }
-    if (parts_.empty()) z.Fail("the sensor measures nothing", kExampleZ);
-    if (const auto where = entry_.Find("where")) {
-      prediction.AddConditions(ParseConditions(*where, scope));
+    if (const auto domain = entry_.Find("domain")) {
+      prediction.AddConditions(ParseConditions(*domain, scope));
     }
     return prediction;
   }
 
-  std::optional<CompiledFunction> ReadSigma(SensorModel::Description& description) const {
-    const auto covariance = entry_.Find("covariance"), sigma = entry_.Find("sigma");
-    if (covariance) {
-      if (sigma) {
-        covariance->Fail("the noise is also defined by `sigma`", "one of the two keys");
-      }
-      description.sqrt_noise = ReadSqrtR(*covariance, description.measurement.geometry.tangent);
-      return std::nullopt;
-    }
+  CompiledFunction ReadSigma() const {
     CompiledFunction function(WithKnown(GeometriesOf(roles_)), entry_);
     Scope scope(function.program());
     Declare(roles_, KnownOffset(function), scope);
-    const std::string example = "sigma: {" + parts_[0].name + ": 0.1}";
-    const Node map = entry_.At("sigma", "a formula", example);
-    map.ExpectMap(example);
-    for (const Space& part : parts_) {
-      const Node node = map.At(part.name, "z." + part.name, example);
-      Value value = ParseExpression(node, scope);
-      const int size = part.geometry.tangent;
-      if (value.size() == 1) value.nodes.resize(static_cast<std::size_t>(size), value.nodes[0]);
-      if (std::ssize(value.nodes) != size) {
-        node.Fail("the list has " + std::to_string(value.size()) + " elements",
-                  std::to_string(size) + ", or one number for all elements");
-      }
-      for (const int element : value.nodes) {
-        const auto number = function.program().ConstantValue(element);
-        if (number && !(*number > 0.0)) node.Fail("the standard deviation is not > 0");
-      }
-      function.AddOutput(Geometry::Vector(size), value, node);
+    for (const Value& sigma : sensor_.ReadSigmas(scope)) {
+      function.AddOutput(Geometry::Vector(static_cast<int>(sigma.size())), sigma,
+                         entry_.At("sigma"));
     }
-    map.RejectUnread();
     return function;
   }
 
   std::optional<CompiledFunction> ReadValidity() const {
     const auto node = entry_.Find("valid");
     if (!node) return std::nullopt;
-    CompiledFunction function(WithKnown({Measurement().geometry}), *node);
+    CompiledFunction function(WithKnown({sensor_.Measurement().geometry}), *node);
     Scope scope(function.program());
     DeclareMeasurement(0, scope);
     Declare({}, KnownOffset(function), scope);
@@ -284,8 +253,8 @@ class SensorReader {
     for (const Space& part : parts_) geometries.push_back(part.geometry);
     CompiledFunction function(WithKnown(std::move(geometries)), *map);
     Scope scope(function.program());
-    Declare(other_roles, KnownOffset(function), scope);
     DeclareMeasurement(function.offset(other_roles.size()), scope);
+    Declare(other_roles, KnownOffset(function), scope);
     const Node& node = entries[0].second;
     function.AddOutput(
         target->geometry,
@@ -297,11 +266,11 @@ class SensorReader {
   void CheckDefinitions() const {
     int measured = 0;
     for (const Space& role : roles_) measured += role.geometry.ambient;
-    const int known = measured + Measurement().geometry.ambient;
+    const int known = measured + sensor_.Measurement().geometry.ambient;
     Program program(known + known_space_.geometry.ambient);
     Scope scope(program);
-    Declare(roles_, known, scope);
     DeclareMeasurement(measured, scope);
+    Declare(roles_, known, scope);
     keys_.CheckDefinitions(scope);
   }
 
@@ -310,27 +279,13 @@ class SensorReader {
     return function.inputs().empty() ? 0 : function.offset(function.inputs().size() - 1);
   }
 
-  Space Measurement() const {
-    if (parts_.size() == 1) return parts_[0];
-    Space all;
-    all.name = kMeasured;
-    std::vector<Geometry> geometries;
-    for (const Space& part : parts_) {
-      all.parts.push_back(part.name);
-      all.part_units.push_back(part.unit);
-      for (const std::string& name : ColumnNames(part.name, part)) all.elements.push_back(name);
-      geometries.push_back(part.geometry);
-      all.doc += (all.doc.empty() ? "" : "; ") + part.doc;
-    }
-    all.geometry = Geometry::Product(geometries);
-    return all;
-  }
-
-  FormulaKeys keys_;
-  Node entry_;
-  std::vector<Space> roles_, known_;
+  SensorKeys sensor_;
+  const Node& entry_ = sensor_.entry;
+  const FormulaKeys& keys_ = sensor_.keys;
+  std::vector<Space>& roles_ = sensor_.roles;
+  std::vector<Space>& parts_ = sensor_.parts;
+  std::vector<Space> known_;
   Space known_space_;
-  std::vector<Space> parts_;
 };
 
 }  // namespace

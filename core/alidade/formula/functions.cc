@@ -183,10 +183,11 @@ constexpr std::array kFunctions = {
     Function{"unit", 1, "unit(a)", "a / norm(a), a unit vector of 3 elements", CompileUnit},
     Function{"rotate", 2, "rotate(q, v)", "v turned by the unit quaternion q",
              CompileRotate<false>},
-    Function{"unrotate", 2, "unrotate(q, v)", "v turned by the inverse of q", CompileRotate<true>},
+    Function{"rotate_inverse", 2, "rotate_inverse(q, v)", "v turned by the inverse of q",
+             CompileRotate<true>},
     Function{"multiply", 2, "multiply(q, r)", "product of two unit quaternions", CompileMultiply},
     Function{"conjugate", 1, "conjugate(q)", "inverse of a unit quaternion", CompileConjugate},
-    Function{"rotation", 1, "rotation(d)", "unit quaternion of a rotation vector in rad",
+    Function{"rotation", 1, "rotation(d)", "Exp(d): unit quaternion of a rotation vector in rad",
              CompileRotation},
 };
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/formula/linear_motion.h"
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -13,9 +11,10 @@
 #include "alidade/base/text.h"
 #include "alidade/config/read_covariance.h"
 #include "alidade/formula/linear_system.h"
+#include "alidade/formula/model_keys.h"
+#include "alidade/formula/models_in_config.h"
 #include "alidade/formula/read_matrix.h"
 #include "alidade/state/dense_algebra.h"
-#include "alidade/state/element_names.h"
 
 namespace alidade::internal {
 namespace {
@@ -27,12 +26,22 @@ constexpr double kMaxSeconds = 1e9;
 ///   model      x' = F x + B_d u + w,   w ~ N(0, Q_d)
 ///   rate       dx/dt = A x + B u + G v,  v has the spectral density Q: F, B_d and Q_d are those of
 ///              the exact solution over dt (linear_system.h)
-///   step       x(t + period) = A x + B u + G v,  v ~ N(0, Q): F, B_d and Q_d are those of k steps.
-///              k = dt / period must be an integer >= 0 within 0.01; else Step fails
-///   Jacobian   F, G = I                            n x n
+///   step       x(t + period) = A x + B u + G v,  v ~ N(0, Q): F, B_d and Q_d are those of k steps,
+///              k = dt / period
+///   Jacobian   F, G = I                                n x n
+///   noise      Q_d                                     n x n
 ///
-/// The control input is constant over dt. The last F, B_d and Q_d are stored, because dt seldom
-/// changes.
+///   symbol     shape  unit       frame  meaning
+///   x          n      config     -      elements of all blocks: numbers and vectors
+///   u          m      config     -      control input, constant over dt
+///   v          k      1          -      noise, whose units are those of G and Q
+///   A          n x n  1/s, or 1  -      by the units of x: of the rate, or of the step
+///   period     1      s          -      key `step.period_s`; > 0
+///
+/// Defined for  `rate`: everywhere. `step`: k an integer >= 0 within 0.01; else Step fails.
+/// Source       [VanLoan1978], for `rate`.
+///
+/// The last F, B_d and Q_d are stored, because dt seldom changes.
 class LinearMotion final : public MotionModel {
  public:
   /// `period_s` has a value if `system` is a discrete equation. Q of `system` is G Q G'.
@@ -113,67 +122,54 @@ class LinearMotion final : public MotionModel {
 class LinearMotionReader {
  public:
   explicit LinearMotionReader(const Node& entry)
-      : keys_(entry),
-        entry_(entry),
-        blocks_(keys_.ReadSpaces("blocks")),
-        inputs_(keys_.ReadSpaces("inputs")) {
-    constexpr const char* kExample = "blocks: {p: [x, y], v: [x, y]}";
-    const Node node = entry.At("blocks", "a linear model", kExample);
-    if (blocks_.empty() || blocks_.size() > std::size_t{kMaxRoles}) {
-      node.Fail("the model has " + std::to_string(blocks_.size()) + " blocks",
-                "1 to " + std::to_string(kMaxRoles));
-    }
-    ExpectVectors(blocks_, node);
-    for (const Space& block : blocks_) {
-      for (const std::string& name : ColumnNames(block.name, block)) names_.push_back(name);
-    }
+      : motion_(entry, "rate: {A: MATRIX}, or step: {period_s: SECONDS, A: MATRIX}") {
+    ExpectVectors(motion_.blocks, entry.At("blocks"));
+    names_ = ColumnsOf(motion_.blocks);
   }
 
   SharedMotion Read() {
-    const auto step = entry_.Find("step"), rate = entry_.Find("rate");
-    if (step.has_value() == rate.has_value()) {
-      rate.value_or(entry_).Fail("a linear motion model needs exactly one of `rate` and `step`",
-                                 "rate: {A: MATRIX}, or step: {period_s: SECONDS, A: MATRIX}");
-    }
-    const Node form = step ? *step : *rate;
+    const Node& form = motion_.equation;
     form.ExpectMap("{A: MATRIX, B: MATRIX, G: MATRIX}");
     std::optional<double> period_s;
-    if (step) {
+    if (!motion_.is_rate) {
       period_s = form.At("period_s", "the discrete form", "period_s: 0.1")
                      .Number(0.0, kMaxSeconds, true, false, "s");
     }
     MotionModel::Description description;
     description.name = kLinear;
-    description.input = Concatenated(inputs_, "input");
+    description.input = motion_.input;
     const int n = static_cast<int>(names_.size());
     LinearSystem system;
     system.a = ReadMatrix(form.At("A", "a linear model", "a list of rows"), "A", n, n, keys_);
-    system.b = ReadB(form, description.input);
-    system.noise = ReadNoise(form);
+    system.b = ReadB();
+    system.noise = ReadNoise();
     description.noise_size = system.noise.isZero(0.0) ? 0 : n;
     form.RejectUnread();
+    keys_.CheckDefinitionsOfConstants();
     keys_.RejectUnread();
     Describe(system, period_s);
-    description.blocks = blocks_;
+    description.blocks = motion_.blocks;
     return std::make_shared<LinearMotion>(std::move(description), std::move(system), period_s);
   }
 
  private:
-  Eigen::MatrixXd ReadB(const Node& form, const Space& input) const {
+  Eigen::MatrixXd ReadB() const {
+    const Node& form = motion_.equation;
     const int n = static_cast<int>(names_.size());
-    if (inputs_.empty()) {
+    if (motion_.inputs.empty()) {
       if (const auto b = form.Find("B")) {
         b->Fail("the model has no control input", "the key `inputs`, such as inputs: {u: [x, y]}");
       }
       return Eigen::MatrixXd(n, 0);
     }
-    ExpectVectors(inputs_, entry_.At("inputs"));
+    ExpectVectors(motion_.inputs, entry_.At("inputs"));
     return ReadMatrix(form.At("B", "the control input", "a list of rows"), "B", n,
-                      input.geometry.ambient, keys_);
+                      motion_.input.geometry.ambient, keys_);
   }
 
   /// Returns G Q G'.
-  Eigen::MatrixXd ReadNoise(const Node& form) const {
+  Eigen::MatrixXd ReadNoise() const {
+    const Node& form = motion_.equation;
     const int n = static_cast<int>(names_.size());
     const auto g_node = form.Find("G"), noise = entry_.Find("noise");
     if (!noise) {
@@ -203,12 +199,10 @@ class LinearMotionReader {
     Eigen::MatrixXd matrix(system.a.rows(), system.a.cols() + system.b.cols());
     matrix << system.a, system.b;
     std::vector<std::string> names = names_;
-    for (const Space& input : inputs_) {
-      for (const std::string& name : ColumnNames(input.name, input)) names.push_back(name);
-    }
+    for (const std::string& name : ColumnsOf(motion_.inputs)) names.push_back(name);
     const std::vector<std::string> rows = RowTexts(matrix, names);
     std::size_t row = 0;
-    for (Space& block : blocks_) {
+    for (Space& block : motion_.blocks) {
       std::vector<std::string> equations;
       for (int i = 0; i < block.geometry.ambient; ++i, ++row) {
         const std::string& name = names_[row];
@@ -220,9 +214,9 @@ class LinearMotionReader {
     }
   }
 
-  FormulaKeys keys_;
-  Node entry_;
-  std::vector<Space> blocks_, inputs_;
+  MotionKeys motion_;
+  const Node& entry_ = motion_.entry;
+  const FormulaKeys& keys_ = motion_.keys;
   std::vector<std::string> names_;  ///< of the elements of all blocks
 };
 

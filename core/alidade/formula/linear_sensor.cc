@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/formula/linear_sensor.h"
-
 #include <cmath>
 #include <utility>
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/text.h"
+#include "alidade/formula/model_keys.h"
+#include "alidade/formula/models_in_config.h"
 #include "alidade/formula/read_matrix.h"
-#include "alidade/plugin/config_noise.h"
-#include "alidade/state/element_names.h"
 
 namespace alidade::internal {
 namespace {
@@ -17,10 +15,19 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 
 /// Linear function of any blocks.
 ///
-///   model      z = sum_i H_i x_i + offset + n,   n ~ N(0, R)
-///   Jacobian   dz/dx_i = H_i
+///   model      z = sum_i H_i x_i + c + n,   n ~ N(0, R)
+///   Jacobian   dz/dx_i = H_i                           m x n_i
+///   noise      R                                       m x m, in the units of z
+///
+///   symbol     shape    unit     frame  meaning
+///   z          m        config   -      measured quantities
+///   x_i        n_i      config   -      block of the role i: a number or a vector
+///   H_i        m x n_i  of z by  -      matrix of the role i
+///                       unit of x_i
+///   c          m        of z     -      key `offset`
 ///
 /// Defined everywhere.
+/// Source       [BarShalom2001] sec. 5.2.
 class LinearSensor final : public SensorModel {
  public:
   /// R of `description` must be set.
@@ -51,96 +58,91 @@ class LinearSensor final : public SensorModel {
 class LinearSensorReader {
  public:
   LinearSensorReader(const Node& entry, const std::vector<Space>& bound_roles)
-      : keys_(entry), entry_(entry), roles_(bound_roles), parts_(keys_.ReadSpaces("z")) {
-    for (Space& role : keys_.ReadSpaces("owns", ALIDADE_ROLE_OWNED)) {
-      roles_.push_back(std::move(role));
-    }
-    if (roles_.size() > std::size_t{kMaxRoles}) {
-      entry_.Fail("the sensor has " + std::to_string(roles_.size()) + " roles",
-                  "at most " + std::to_string(kMaxRoles));
-    }
-    constexpr const char* kExample = "z: {position: [x, y]}";
-    const Node z = entry_.At("z", "a linear sensor", kExample);
-    if (parts_.empty()) z.Fail("the sensor measures nothing", kExample);
-    ExpectVectors(parts_, z);
-    ExpectVectors(roles_, entry_);
+      : sensor_(entry, bound_roles) {
+    const Node z = sensor_.Measured("z: {position: [x, y]}");
+    sensor_.parts = keys_.ReadSpaces("z");
+    ExpectVectors(sensor_.parts, z);
+    ExpectVectors(sensor_.roles, entry);
   }
 
   SharedSensor Read() {
-    SensorModel::Description description;
-    description.name = kLinear;
-    description.roles = roles_;
-    description.measurement = Concatenated(parts_, "z");
-    const int m = description.measurement.geometry.tangent;
-    const Node node = entry_.At("H", "a linear sensor", "H: {ROLE: MATRIX}");
+    const Node& entry = sensor_.entry;
+    const int m = sensor_.Measurement().geometry.tangent;
+    const Node node = entry.At("H", "a linear sensor", "H: {ROLE: MATRIX}");
     node.ExpectMap("{ROLE: MATRIX}");
     std::vector<RowMajor> h;
-    std::vector<std::string> columns;
-    Eigen::MatrixXd all(m, 0);
-    for (const Space& role : roles_) {
+    for (const Space& role : sensor_.roles) {
       const Node matrix = node.At(role.name, "role '" + role.name + "'", role.name + ": MATRIX");
       h.emplace_back(ReadMatrix(matrix, "H." + role.name, m, role.geometry.tangent, keys_));
-      Eigen::MatrixXd wider(m, all.cols() + h.back().cols());
-      wider << all, h.back();
-      all = std::move(wider);
-      for (const std::string& name : ColumnNames(role.name, role)) columns.push_back(name);
     }
     node.RejectUnread();
     Eigen::VectorXd offset = Eigen::VectorXd::Zero(m);
-    if (const auto values = entry_.Find("offset")) {
+    if (const auto values = entry.Find("offset")) {
       offset = ReadMatrix(*values, "offset", m, 1, keys_);
     }
-    Describe(all, columns, offset, description.measurement);
+    Describe(h, offset);
+    SensorModel::Description description;
+    description.name = kLinear;
+    description.roles = sensor_.roles;
+    description.measurement = sensor_.Measurement();
     description.sqrt_noise = ReadSqrtNoise(m);
+    keys_.CheckDefinitionsOfConstants();
     keys_.RejectUnread();
     return std::make_shared<LinearSensor>(std::move(description), std::move(h), std::move(offset));
   }
 
  private:
-  static void Describe(const Eigen::MatrixXd& h, const std::vector<std::string>& columns,
-                       const Eigen::VectorXd& offset, Space& measurement) {
-    std::vector<std::string> equations = RowTexts(h, columns);
-    const std::vector<std::string> names = ColumnNames(measurement.name, measurement);
-    for (std::size_t i = 0; i < equations.size(); ++i) {
-      const double constant = offset[static_cast<Eigen::Index>(i)];
-      equations[i] = names[i] + " = " + equations[i];
-      if (constant == 0.0) continue;
-      equations[i] += (constant < 0.0 ? " - " : " + ") + NumberText(std::abs(constant));
+  /// Adds the equations of each part as its description.
+  void Describe(const std::vector<RowMajor>& h, const Eigen::VectorXd& offset) {
+    const std::vector<std::string> columns = ColumnsOf(sensor_.roles);
+    Eigen::MatrixXd all(offset.size(), static_cast<Eigen::Index>(columns.size()));
+    Eigen::Index column = 0;
+    for (const RowMajor& matrix : h) {
+      all.middleCols(column, matrix.cols()) = matrix;
+      column += matrix.cols();
     }
-    measurement.doc = Join(equations);
+    std::vector<std::string> rows = RowTexts(all, columns);
+    std::size_t row = 0;
+    for (Space& part : sensor_.parts) {
+      std::vector<std::string> equations;
+      for (const std::string& name : ColumnNames(part.name, part)) {
+        const double constant = offset[static_cast<Eigen::Index>(row)];
+        equations.push_back(name + " = " + rows[row++]);
+        if (constant == 0.0) continue;
+        equations.back() += (constant < 0.0 ? " - " : " + ") + NumberText(std::abs(constant));
+      }
+      part.doc = Join(equations);
+    }
   }
 
   /// Returns the lower triangular L of R = L L', row-major.
   std::vector<double> ReadSqrtNoise(int size) const {
-    const auto covariance = entry_.Find("covariance"), sigma = entry_.Find("sigma");
-    if (covariance) {
-      if (sigma) covariance->Fail("the noise is also defined by `sigma`", "one of the two keys");
-      return ReadSqrtR(*covariance, size);
-    }
-    const std::string example = "sigma: {" + parts_[0].name + ": 0.1}";
-    const Node map = entry_.At("sigma", "a linear sensor", example);
-    map.ExpectMap(example);
+    if (const auto root = sensor_.ReadSqrtCovariance()) return *root;
+    Program program(0);
+    Scope scope(program);
+    keys_.AddTo(scope);
     RowMajor root = RowMajor::Zero(size, size);
-    Eigen::Index first = 0;
-    for (const Space& part : parts_) {
-      const Node node = map.At(part.name, "z." + part.name, example);
-      const Eigen::VectorXd sigmas = ReadSigmas(node, part.geometry.tangent, keys_);
-      if (sigmas.minCoeff() <= 0.0) node.Fail("the standard deviation is not > 0");
-      root.diagonal().segment(first, sigmas.size()) = sigmas;
-      first += sigmas.size();
+    Eigen::Index i = 0;
+    for (const Value& sigma : sensor_.ReadSigmas(scope)) {
+      for (const double number : ConstantsOf(sigma, program, sensor_.entry.At("sigma"))) {
+        root(i, i) = number;
+        ++i;
+      }
     }
-    map.RejectUnread();
     return {root.data(), root.data() + root.size()};
   }
 
-  FormulaKeys keys_;
-  Node entry_;
-  std::vector<Space> roles_, parts_;
+  SensorKeys sensor_;
+  const FormulaKeys& keys_ = sensor_.keys;
 };
 
 }  // namespace
 
-SharedSensor CreateLinearSensor(const Node& entry, const std::vector<Space>& bound_roles) {
+SharedSensor CreateLinearSensor(const Node& entry, const std::vector<Space>& bound_roles,
+                                bool has_landmark) {
+  if (has_landmark) {
+    entry.At("roles").At("landmark").Fail("the model linear has no landmarks", "the model formula");
+  }
   return LinearSensorReader(entry, bound_roles).Read();
 }
 

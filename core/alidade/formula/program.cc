@@ -147,7 +147,7 @@ inline bool Compute(Op op, double x, double y, Result& r) {
 }  // namespace
 
 Program::Program(int variables) : variables_(variables) {
-  nodes_.assign(static_cast<std::size_t>(variables), Node{Op::kVariable});
+  nodes_.assign(static_cast<std::size_t>(variables), Operation{Op::kVariable});
 }
 
 int Program::Constant(double value) { return Append({Op::kConstant, -1, -1, value}); }
@@ -187,7 +187,7 @@ int Program::Add(Op op, int x, int y) {
 }
 
 std::optional<double> Program::ConstantValue(int node) const {
-  const Node& n = nodes_[static_cast<std::size_t>(node)];
+  const Operation& n = nodes_[static_cast<std::size_t>(node)];
   return n.op == Op::kConstant ? std::optional(n.value) : std::nullopt;
 }
 
@@ -198,7 +198,7 @@ Program::Sweep Program::SweepFrom(int node) const {
   for (int i = node; i >= 0; --i) {
     if (!is_used[static_cast<std::size_t>(i)]) continue;
     sweep.push_back(i);
-    const Node& n = nodes_[static_cast<std::size_t>(i)];
+    const Operation& n = nodes_[static_cast<std::size_t>(i)];
     for (const int operand : {n.x, n.y})
       if (operand >= 0) is_used[static_cast<std::size_t>(operand)] = true;
   }
@@ -209,7 +209,7 @@ bool Program::Evaluate(const double* x, bool with_slopes, Tape& tape) const {
   for (int i = 0; i < variables_; ++i) tape.value[i] = x[i];
   double undefined = 0.0;  // NaN as soon as a value is not finite
   int i = variables_;
-  for (const Node* node = nodes_.data() + variables_; i < size(); ++i, ++node) {
+  for (const Operation* node = nodes_.data() + variables_; i < size(); ++i, ++node) {
     if (node->op == Op::kConstant) {
       tape.value[i] = node->value;
       continue;
@@ -251,7 +251,7 @@ void Program::Gradient(const Sweep& sweep, Tape& tape, double* gradient) const {
   for (const int i : sweep) tape.adjoint[i] = 0.0;
   tape.adjoint[sweep.front()] = 1.0;
   for (const int i : sweep) {
-    const Node& node = nodes_[static_cast<std::size_t>(i)];
+    const Operation& node = nodes_[static_cast<std::size_t>(i)];
     if (node.x < 0) continue;  // a variable or a constant
     const double adjoint = tape.adjoint[i];
     tape.adjoint[node.x] += adjoint * tape.slope[i][0];
@@ -260,10 +260,10 @@ void Program::Gradient(const Sweep& sweep, Tape& tape, double* gradient) const {
   for (int i = 0; i < variables_; ++i) gradient[i] = tape.adjoint[i];
 }
 
-int Program::Append(const Node& node) {
-  const auto [found, is_new] = known_nodes_.try_emplace({node.op, node.x, node.y, node.value},
-                                                        static_cast<int>(nodes_.size()));
-  if (is_new) nodes_.push_back(node);
+int Program::Append(const Operation& operation) {
+  const auto [found, is_new] = known_nodes_.try_emplace(
+      {operation.op, operation.x, operation.y, operation.value}, static_cast<int>(nodes_.size()));
+  if (is_new) nodes_.push_back(operation);
   return found->second;
 }
 

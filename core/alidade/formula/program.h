@@ -77,16 +77,16 @@ class Program {
   void Gradient(const Sweep& sweep, Tape& tape, double* gradient) const;
 
  private:
-  struct Node {
+  struct Operation {
     Op op;
     int x = -1, y = -1;
     double value = 0.0;  ///< of a constant
   };
 
-  int Append(const Node& node);
+  int Append(const Operation& operation);
 
   int variables_;
-  std::vector<Node> nodes_;
+  std::vector<Operation> nodes_;
   std::map<std::tuple<Op, int, int, double>, int> known_nodes_;
 };
 

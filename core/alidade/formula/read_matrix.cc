@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "alidade/base/number_text.h"
+#include "alidade/config/read_covariance.h"
 
 namespace alidade::internal {
 namespace {
@@ -17,16 +18,20 @@ std::vector<double> ReadRow(const Node& node, const FormulaKeys& keys) {
   Program program(0);
   Scope scope(program);
   keys.AddTo(scope);
+  return ConstantsOf(ParseExpression(node, scope), program, node);
+}
+
+}  // namespace
+
+std::vector<double> ConstantsOf(const Value& value, const Program& program, const Node& node) {
   std::vector<double> numbers;
-  for (const int element : ParseExpression(node, scope).nodes) {
+  for (const int element : value.nodes) {
     const auto number = program.ConstantValue(element);
     if (!number) node.Fail("an element has no finite value", "numbers, such as 2 or 30deg");
     numbers.push_back(*number);
   }
   return numbers;
 }
-
-}  // namespace
 
 Eigen::MatrixXd ReadMatrix(const Node& node, const std::string& name, int rows, int columns,
                            const FormulaKeys& keys) {
@@ -51,14 +56,8 @@ Eigen::MatrixXd ReadMatrix(const Node& node, const std::string& name, int rows, 
 
 Eigen::VectorXd ReadSigmas(const Node& node, int size, const FormulaKeys& keys) {
   std::vector<double> sigmas = ReadRow(node, keys);
-  if (sigmas.size() == 1) sigmas.resize(static_cast<std::size_t>(size), sigmas[0]);
-  if (std::ssize(sigmas) != size) {
-    node.Fail("the list has " + CountText(std::ssize(sigmas), "element"),
-              std::to_string(size) + ", or one number for all elements");
-  }
-  for (const double sigma : sigmas) {
-    if (sigma < 0.0) node.Fail("the standard deviation is negative", "a value >= 0");
-  }
+  RepeatTo(size, node, sigmas);
+  for (const double sigma : sigmas) ExpectSigma(node, sigma);
   return Eigen::Map<const Eigen::VectorXd>(sigmas.data(), size);
 }
 

@@ -18,6 +18,9 @@ Eigen::MatrixXd ReadMatrix(const Node& node, const std::string& name, int rows, 
 /// Reads one standard deviation for all elements, or one for each of `size` elements.
 Eigen::VectorXd ReadSigmas(const Node& node, int size, const FormulaKeys& keys);
 
+/// Returns the elements of a value that depends on constants only. `node` is its expression.
+std::vector<double> ConstantsOf(const Value& value, const Program& program, const Node& node);
+
 /// Rejects spaces that are not vectors. `node` is the place that messages report.
 void ExpectVectors(const std::vector<Space>& spaces, const Node& node);
 

@@ -15,10 +15,6 @@ namespace alidade::internal {
 /// a motion model. `kind` is one of ALIDADE_KIND_*.
 std::optional<Node> FindNoiseCovariance(const Node& entry, std::uint32_t kind);
 
-/// Returns the lower triangular matrix L of the covariance R = L L' of a measurement, n x n
-/// row-major. R must be positive definite. Error: kBadConfig.
-std::vector<double> ReadSqrtR(const Node& covariance, int size);
-
 /// Returns the lower triangular matrix L of the covariance L L', n x n row-major. For a sensor, the
 /// covariance is R in the tangent space of the measurement, and must be positive definite. For a
 /// motion model, the covariance is Qw of the noise inputs, and may be singular. The noise of the

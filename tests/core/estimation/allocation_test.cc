@@ -59,8 +59,8 @@ TEST(ControlInput, TakesNoAllocation) {
 TEST(FormulaModels, TakeNoAllocation) {
   const SharedSensor sensor = testing::FormulaSensorOf(
       R"yaml(known: {anchor: [x, y, z]}
-z: {range: norm(p - anchor), ray: "unit(unrotate(q, p))"}
-where: p.x > 0
+z: {range: norm(p - anchor), ray: "unit(rotate_inverse(q, p))"}
+domain: p.x > 0
 valid: z.range > 0
 sigma: {range: 0.1 + 0.01 * norm(p), ray: 0.1}
 initialise: {p: "anchor + z.range * rotate(q, z.ray)"}

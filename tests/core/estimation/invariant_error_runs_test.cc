@@ -29,6 +29,8 @@ TEST(InvariantErrorRuns, TheRightErrorSuitsKnownPointsInTheFrameOfTheBody) {
   const auto right = MeanErrors(InertialSensor::kPoints, ErrorSide::kRight, kTimes, kSeeds);
   for (std::size_t k = 0; k < kTimes.size(); ++k)
     EXPECT_GT(plain[k].nees, 4.0 * right[k].nees) << k;
+  // The initial error is so large that NEES decreases towards 1 only with time.
+  for (std::size_t k = 0; k < kTimes.size(); ++k) EXPECT_GT(right[k].nees, 0.8) << k;
   EXPECT_LT(right[2].nees, 1.5);
 }
 

@@ -164,7 +164,9 @@ TEST(ShortForms, RolesOfSeveralEntries) {
 }
 
 TEST(ShortForms, RolesOfAFormulaHaveTheNamesOfTheBlocks) {
-  const std::string formula = std::string(kDepth) + "  s: {model: formula, stream: s, roles: ";
+  const std::string formula =
+      std::string(kDepth) +
+      "  s: {model: formula, stream: s, z: {a: depth}, sigma: {a: 1}, roles: ";
   const std::string text = Expanded(formula + "[target, template]}\n");
   EXPECT_NE(text.find("depth: target.depth\n      velocity: target.velocity\n      "
                       "inverse_distance: template.inverse_distance\n"),
@@ -181,6 +183,30 @@ TEST(ShortForms, RolesOfMatricesAreThoseOfH) {
   EXPECT_NE(text.find("roles:\n      depth: target.depth\n"), std::string::npos) << text;
   EXPECT_EQ(text.find("velocity: target.velocity"), std::string::npos) << text;
   EXPECT_EQ(ErrorOf(linear + "target}\n"), "no error");
+}
+
+TEST(ShortForms, AFormulaHasTheShortFormsOfItsStates) {
+  const std::string formula = std::string(kDepth) +
+                              "  s: {model: formula, stream: s, z: {a: depth + bias}, sigma: {a: "
+                              "1}, owns: {bias: number}, roles: target, initial: {bias: ";
+  for (const char* initial : {"{sigma: 0.5}", "exact"}) {
+    EXPECT_EQ(ErrorOf(formula + initial + "}}\n"), "no error") << initial;
+  }
+}
+
+TEST(ShortForms, TheRoleOfALandmarkOfAFormulaIsOptional) {
+  const std::string text = Expanded(
+      std::string(kDepth) +
+      "  s: {model: formula, stream: s, landmark: [x], z: {a: depth - landmark.x}, sigma: {a: 1}, "
+      "roles: target}\n");
+  EXPECT_NE(text.find("landmark: landmarks\n"), std::string::npos) << text;
+}
+
+TEST(ShortForms, AFormulaReportsABlockThatDoesNotExist) {
+  const std::string error = ErrorOf(
+      std::string(kDepth) +
+      "  s: {model: formula, stream: s, z: {a: d}, sigma: {a: 1}, roles: {d: target.dpth}}\n");
+  EXPECT_NE(error.find("'target.dpth' does not exist"), std::string::npos) << error;
 }
 
 TEST(ShortForms, ErrorsOfRolesListTheCandidates) {

@@ -90,7 +90,7 @@ TEST(Expression, KnowsTheUsualFunctions) {
 
 TEST(Expression, KnowsUnitQuaternions) {
   ExpectValue("rotate(q, p)", {-4, 3, 12});
-  ExpectValue("unrotate(q, p)", {4, -3, 12});
+  ExpectValue("rotate_inverse(q, p)", {4, -3, 12});
   ExpectValue("rotate(multiply(q, q), p)", {-3, -4, 12});
   ExpectValue("rotate(conjugate(q), p)", {4, -3, 12});
   ExpectValue("rotation([0, 0, pi / 2])", {std::sqrt(0.5), 0, 0, std::sqrt(0.5)});

@@ -201,11 +201,13 @@ TEST(FormulaMotion, ErrorsNameTheKey) {
   EXPECT_NE(error("blocks: {aa: number}\nrate: {ab: 1}\n").find("did you mean 'aa'?"),
             std::string::npos);
   EXPECT_EQ(error("blocks: {a: number}\nnoise: {n: -1}\nrate: {a: n}\n"),
-            "f.yaml:2:12 noise.n: the standard deviation is negative; expected a value >= 0");
+            "f.yaml:2:12 noise.n: a standard deviation is negative; expected a value >= 0");
   EXPECT_EQ(
       error("blocks: {u: unit_vector}\nrate: {u: u}\n"),
       "f.yaml:2:11 rate.u: a block of geometry unit_vector has no rate; expected `step`, or a "
       "block that is a number, a vector, an angle or a unit quaternion");
+  EXPECT_EQ(error("blocks: {a: number, dt: number}\nstep: {a: a}\n"),
+            "f.yaml:1:25 blocks.dt: the name 'dt' is already used; expected another name");
   EXPECT_EQ(error("blocks: {v: number}\nrate: {v: -v / dt}\n"),
             "f.yaml:2:16 rate.v: the name 'dt' does not exist; expected v");
   EXPECT_EQ(error("blocks: {v: number}\nlet: {f: 1 / dt}\nrate: {v: -v}\n"),

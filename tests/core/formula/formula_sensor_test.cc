@@ -60,8 +60,8 @@ sigma: {a: 1, b: 1, c: 1, d: 1, e: 1, f: 1, g: 1, h: 1, i: 1, j: 1, k: 1}
 TEST(FormulaSensor, ItsRolesHaveTheirGeometry) {
   const SharedSensor sensor = FormulaSensorOf(
       R"yaml(constants: {arm: [0.3, 0, 1.2], north: [0, 1, 0]}
-z: {fix: "p + rotate(q, arm)", body: "unrotate(q, north)", ray: "unit(p)", star: "rotate(q, u)",
-    turn: "multiply(conjugate(q), r)", heading: "h - 30deg"}
+z: {fix: "p + rotate(q, arm)", body: "rotate_inverse(q, north)", ray: "unit(p)",
+    star: "rotate(q, u)", turn: "multiply(conjugate(q), r)", heading: "h - 30deg"}
 sigma: {fix: [0.02, 0.02, 0.04], body: 0.1, ray: 0.01, star: 0.02, turn: 0.03, heading: 1deg}
 )yaml",
       {VectorSpace("p", 3), NamedSpace("q", Geometry::UnitQuaternion()),
@@ -121,11 +121,11 @@ TEST(FormulaSensor, HasADomain) {
   }
   EXPECT_EQ(status_at("z: {a: asin(x)}", 1.0), kOut);
   EXPECT_EQ(status_at("z: {a: exp(x)}", 1e4), kOut);
-  EXPECT_EQ(status_at("z: {a: x}\nwhere: x > 1", 1.0), kOut);
-  EXPECT_EQ(status_at("z: {a: x}\nwhere: x >= 1", 1.0), kOk);
-  EXPECT_EQ(status_at("z: {a: x}\nwhere: 0 < x < 2 and x^2 < 3", 1.9), kOut);
-  EXPECT_EQ(status_at("z: {a: x}\nwhere: 0 < x < 2 and x^2 < 3", 1.7), kOk);
-  EXPECT_EQ(status_at("z: {a: x}\nwhere: [x > 0, x < 2]", 2.5), kOut);
+  EXPECT_EQ(status_at("z: {a: x}\ndomain: x > 1", 1.0), kOut);
+  EXPECT_EQ(status_at("z: {a: x}\ndomain: x >= 1", 1.0), kOk);
+  EXPECT_EQ(status_at("z: {a: x}\ndomain: 0 < x < 2 and x^2 < 3", 1.9), kOut);
+  EXPECT_EQ(status_at("z: {a: x}\ndomain: 0 < x < 2 and x^2 < 3", 1.7), kOk);
+  EXPECT_EQ(status_at("z: {a: x}\ndomain: [x > 0, x < 2]", 2.5), kOut);
 }
 
 TEST(FormulaSensor, RejectsMeasurementsByTheirValue) {
@@ -211,7 +211,7 @@ TEST(FormulaSensor, ErrorsNameTheKey) {
     return Message([&] { FormulaSensorOf(yaml, {VectorSpace("p", 2)}); });
   };
   EXPECT_EQ(error("sigma: {range: 1}\n"),
-            "f.yaml:1:1 z: missing key, needed by a formula; expected z: {range: norm(p - "
+            "f.yaml:1:1 z: missing key, needed by a sensor; expected z: {range: norm(p - "
             "anchor)}");
   EXPECT_NE(error("z: {range: p.x}\nsigma: {rnge: 1}\n").find("z.range"), std::string::npos);
   EXPECT_EQ(error("z: {range: p.x}\nsigma: {range: -1}\n"),
@@ -224,11 +224,18 @@ TEST(FormulaSensor, ErrorsNameTheKey) {
             "2 or 30deg");
   EXPECT_EQ(error("owns: {b: angel}\nz: {fix: p}\nsigma: {fix: 1}\n").substr(0, 44),
             "f.yaml:1:11 owns.b: 'angel' is not a geometr");
+  EXPECT_EQ(Message([] {
+              FormulaSensorOf(
+                  "roles: {p: drone.p, z: drone.z}\nz: {height: z.x}\n"
+                  "sigma: {height: 1}\n",
+                  {VectorSpace("p", 2), VectorSpace("z", 2)});
+            }),
+            "f.yaml:1:24 roles.z: the name 'z' is already used; expected another name");
   EXPECT_NE(error("units: {fx: m}\nz: {fix: p}\nsigma: {fix: 1}\n").find("fx"), std::string::npos);
-  EXPECT_NE(error("wehre: p.x > 0\nz: {fix: p}\nsigma: {fix: 1}\n").find("did you mean 'where'?"),
+  EXPECT_NE(error("domian: p.x > 0\nz: {fix: p}\nsigma: {fix: 1}\n").find("did you mean 'domain'?"),
             std::string::npos);
-  EXPECT_EQ(error("where: p.x\nz: {fix: p}\nsigma: {fix: 1}\n"),
-            "f.yaml:1:11 where: the expression ends too early; expected a comparison: <, <=, > or "
+  EXPECT_EQ(error("domain: p.x\nz: {fix: p}\nsigma: {fix: 1}\n"),
+            "f.yaml:1:12 domain: the expression ends too early; expected a comparison: <, <=, > or "
             ">=");
 }
 

@@ -79,14 +79,14 @@ void ExpectTwinMotion(const SharedMotion& motion, const std::string& yaml, const
 TEST(FormulaTwins, StereoDisparity) {
   ExpectTwinSensor(MakeSensor(StereoDisparity(400, 0.065, 1.5)),
                    "constants: {bf: 400 * 0.065}\nz: {disparity: bf / depth}\n"
-                   "where: depth > 0\nsigma: {disparity: 1.5}\n",
+                   "domain: depth > 0\nsigma: {disparity: 1.5}\n",
                    {{0.35}});
 }
 
 TEST(FormulaTwins, Scale2d) {
   ExpectTwinSensor(MakeSensor(Scale2d::FromPixels(300, 1)),
                    "let: {s: inverse_distance * depth}\nz: {inverse_scale: s}\n"
-                   "where: depth > 0 and inverse_distance > 0\n"
+                   "domain: depth > 0 and inverse_distance > 0\n"
                    "sigma: {inverse_scale: 2 / 300 * s^3}\n",
                    {{0.35}, {3.1}});
 }
@@ -100,7 +100,7 @@ TEST(FormulaTwins, Pose) {
 
 TEST(FormulaTwins, RelativePose) {
   ExpectTwinSensor(MakeSensor(RelativePose<3>({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03})),
-                   "z:\n  position: unrotate(orientation, landmark_position - position)\n"
+                   "z:\n  position: rotate_inverse(orientation, landmark_position - position)\n"
                    "  orientation: multiply(conjugate(orientation), landmark_orientation)\n"
                    "sigma: {position: [0.1, 0.2, 0.3], orientation: [0.01, 0.02, 0.03]}\n",
                    {{1, 2, 3}, {0.5, -0.5, 0.5, 0.5}, {-2, 5, 1}, {0.8, 0.6, 0, 0}});
@@ -108,7 +108,7 @@ TEST(FormulaTwins, RelativePose) {
 
 TEST(FormulaTwins, RangeBearing) {
   ExpectTwinSensor(MakeSensor(RangeBearing<Xyz>(0.1, 0.02)),
-                   "let:\n  h: unrotate(orientation, landmark - position)\n"
+                   "let:\n  h: rotate_inverse(orientation, landmark - position)\n"
                    "z: {range: norm(h), bearing: unit(h)}\nsigma: {range: 0.1, bearing: 0.02}\n",
                    {{1, 2, 3}, {0.5, -0.5, 0.5, 0.5}, {-2, 5, 1}});
 }
@@ -178,7 +178,7 @@ TEST(FormulaTwins, RangeBearingToPoint) {
   const std::array point = {7.0, -5.0, 2.0};
   ExpectTwinSensor(MakeSensor(RangeBearingToPoint<3>(0.1, 0.02)), R"yaml(
 known: {point: [x, y, z]}
-let: {h: "unrotate(mounting, unrotate(orientation, point - position) - lever_arm)"}
+let: {h: "rotate_inverse(mounting, rotate_inverse(orientation, point - position) - lever_arm)"}
 z: {range: norm(h), bearing: unit(h)}
 sigma: {range: 0.1, bearing: 0.02}
 )yaml",

@@ -167,7 +167,7 @@ TEST(LinearMotion, ReportsWrongMatrices) {
       message("rate: {" + a + ", G: [1, 2, 3]}\n").find("missing key, needed by the matrix G"),
       std::string::npos);
   EXPECT_NE(message("step: {" + a + "}\n").find("period_s"), std::string::npos);
-  EXPECT_NE(message(a + "\n").find("exactly one of `rate` and `step`"), std::string::npos);
+  EXPECT_NE(message(a + "\n").find("exactly one of `step` and `rate`"), std::string::npos);
   EXPECT_EQ(Message([] { LinearMotionOf("blocks: {q: unit_quaternion}\nrate: {A: 1}\n"); }),
             "f.yaml:1:9 blocks: 'q' has geometry unit_quaternion; expected numbers and vectors, or "
             "the model formula");

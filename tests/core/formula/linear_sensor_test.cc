@@ -41,6 +41,7 @@ sigma: {position: [0.3, 0.4]}
 constexpr const char* kTwoParts = R"yaml(owns: {bias: number}
 constants: {scale: 2}
 z: {sum: [a, b], speed: number}
+units: {sum: m, speed: m/s}
 H:
   p: [[scale, 1], [0, -1], [0, 0]]
   v: [[0, 0], [3, 0], [0, 0.5]]
@@ -62,8 +63,10 @@ TEST(LinearSensor, IsASumOverItsRoles) {
   EXPECT_EQ(l, (std::array<double, 9>{2, 0, 0, 1, 2, 0, 0, 0, 3}));
   EXPECT_EQ(sensor->measurement().elements, (std::vector<std::string>{"sum.a", "sum.b", "speed"}));
   EXPECT_EQ(sensor->measurement().doc,
-            "z.sum.a = 2 p.x + p.y + bias + 10, z.sum.b = -p.y + 3 v.x + 20, "
-            "z.speed = 0.5 v.y + bias + 30");
+            "sum.a = 2 p.x + p.y + bias + 10, sum.b = -p.y + 3 v.x + 20; "
+            "speed = 0.5 v.y + bias + 30");
+  EXPECT_EQ(sensor->measurement().parts, (std::vector<std::string>{"sum", "speed"}));
+  EXPECT_EQ(sensor->measurement().part_units, (std::vector<std::string>{"m", "m/s"}));
 }
 
 TEST(LinearSensor, ReportsWrongMatrices) {
@@ -82,6 +85,8 @@ TEST(LinearSensor, ReportsWrongMatrices) {
             "f.yaml:3:9 offset: the matrix offset has 1 row; expected 2 rows of 1 number");
   EXPECT_EQ(message(h + "sigma: {position: [1, 0]}\n"),
             "f.yaml:3:19 sigma.position: the standard deviation is not > 0");
+  EXPECT_EQ(message(h + "sigma: {position: 1}\nlet: {a: cc}\n"),
+            "f.yaml:4:10 let.a: the name 'cc' does not exist; expected a");
   EXPECT_NE(message(h + "covariance: [[1]]\n").find("2 rows of 2 numbers"), std::string::npos);
   EXPECT_NE(message(h).find("sigma"), std::string::npos);
 }

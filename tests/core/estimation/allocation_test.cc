@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "alidade/estimation/iekf.h"
+#include "alidade/estimation/invariant_error.h"
 #include "alidade/estimation/square_root_ekf.h"
 #include "alidade/estimation/ukf.h"
 #include "alidade/io/log.h"
@@ -84,6 +85,28 @@ initialise: {p: "anchor + z.range * rotate(q, z.ray)"}
   for (const SharedMotion& motion : {step, rate}) {
     EXPECT_EQ(motion->Step(values, nullptr, nullptr, 0.1, {next, first, second, l}), Status::kOk);
   }
+  EXPECT_EQ(allocations - before, 0);
+}
+
+TEST(InvariantModels, TakeNoAllocation) {
+  Problem problem;
+  const StateHandle body = problem.AddState(
+      "body", testing::Unicycle(),
+      {{"position", {1.0, 2.0}, {0.5, 0.2}}, {"heading", {2.0}, {0.4}}, {"mast", {0.3, 0.1}, 0.1}},
+      {"odometry"});
+  problem.AddSensor("gnss", testing::OnMast(), {body["position"], body["heading"], body["mast"]});
+  const Problem inner =
+      internal::InvariantProblem({ErrorSide::kRight, {body["position"], body["heading"]}}, problem);
+  const MotionModel& motion = *inner.motions[0].model;
+  const SensorModel& sensor = *inner.sensors[0].model;
+  const double element[] = {1, 2, 2}, mast[] = {0.3, 0.1}, input[] = {1.0, 0.2};
+  const double* const blocks[] = {element, mast};
+  double next_element[3], next_mast[2], f[25], g[25], h[2], j_element[6], j_mast[4];
+  double *const next[] = {next_element, next_mast}, *const jacobians[] = {j_element, j_mast};
+  const int strides[] = {3, 2};
+  const long before = allocations;
+  EXPECT_EQ(motion.Step(blocks, input, nullptr, 0.1, {next, f, g, nullptr}), Status::kOk);
+  EXPECT_EQ(sensor.Linearise(blocks, h, jacobians, strides), Status::kOk);
   EXPECT_EQ(allocations - before, 0);
 }
 

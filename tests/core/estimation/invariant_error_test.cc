@@ -303,6 +303,12 @@ TEST_P(InvariantErrorOf, CopiesAreIndependentAndRollBack) {
   EXPECT_EQ(estimator->timestamp(), in_order->timestamp());
 }
 
+TEST(InvariantError, MessagesReportTheOriginalBlocks) {
+  const Problem problem = Body(0.1);
+  const Problem inner = internal::InvariantProblem(ErrorOf(problem, ErrorSide::kLeft), problem);
+  EXPECT_EQ(inner.layout.blocks().back().name, "body.position, body.orientation, body.velocity");
+}
+
 TEST(InvariantError, RefusesBlocksThatAreNotAGroup) {
   const Problem problem = Body(1.0);
   const auto defect = [&](const std::vector<std::string>& names, const Problem& of) {

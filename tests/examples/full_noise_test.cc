@@ -72,11 +72,12 @@ TEST(FullNoise, OfAConfigAndOfAModelIsThatOfEachMeasurement) {
   const PluginHost host;
   const Config config = WithCovariance("[[1, 0.6], [0.6, 4]]", host);
   const std::unique_ptr<Source> source = std::move(BuildExperiment(config, host).source);
-  Problem problem = ReadProblem(config.root(), host, {"pixels"});
+  Problem problem = ReadProblem(config.root(), host, std::vector<std::string>{"pixels"});
   const std::vector<StreamInfo> streams = source->streams();
   Ekf by_config(problem, {}, streams);
   const Config other = WithCovariance("[[9, 0], [0, 9]]", host);
-  Ekf by_measurement(ReadProblem(other.root(), host, {"pixels"}), {}, streams);
+  Ekf by_measurement(ReadProblem(other.root(), host, std::vector<std::string>{"pixels"}), {},
+                     streams);
   const Camera camera(640, 480, 525.0, 525.0, 320.0, 240.0);
   problem.sensors.at(0).model =
       MakeSensor(CorrelatedPixel<InverseDepth>(camera, 1.0, 2.0, 0.3), "correlated_pixel");

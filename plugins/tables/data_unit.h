@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 
@@ -11,10 +12,15 @@ inline constexpr const char* kDataUnits =
     "g, mg (standard gravity), kn, mph, rpm, nmi, mi, Pa, hPa, mbar, kPa, bar, T, mT, uT, nT, "
     "gauss";
 
-/// Returns the value of a unit in SI units, such as pi/180 for `deg`, or 1/3.6 for `km/h`. The
-/// value of a unit of the magnetic field is in uT, the unit of sensor magnetometer. A slash divides
-/// by each further unit. Returns nullopt if the unit is unknown. In data, `g` is the standard
-/// gravity, not the gram.
-std::optional<double> DataUnitFactor(const std::string& unit);
+/// Unit of recorded data.
+struct DataUnit {
+  double factor;                          ///< value in SI units, such as 1/3.6 for `km/h`
+  std::map<std::string, int> dimensions;  ///< exponents of SI units, such as m: 1 and s: -1
+};
+
+/// Parses a unit. The value of a unit of the magnetic field is in uT, the unit of sensor
+/// magnetometer. A slash divides by each further unit. Returns nullopt if the unit is unknown. In
+/// data, `g` is the standard gravity, not the gram.
+std::optional<DataUnit> ParseDataUnit(const std::string& unit);
 
 }  // namespace alidade

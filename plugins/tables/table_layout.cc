@@ -39,15 +39,16 @@ void ReadForEachColumn(const Node& node, const char* key, TableField& field, con
   }
 }
 
-double ReadUnit(const Node& node) {
+void ReadUnit(const Node& node, Conversion& conversion) {
   const std::string name = node.Text();
-  const std::optional<double> factor = DataUnitFactor(name);
-  if (!factor) {
+  const std::optional<DataUnit> unit = ParseDataUnit(name);
+  if (!unit) {
     node.Fail(
         "'" + name + "' is not a unit",
         std::string("a unit such as deg, deg/s, km/h, ft or mm/s^2, or one of ") + kDataUnits);
   }
-  return *factor;
+  conversion.unit = unit->factor;
+  conversion.unit_node = node;
 }
 
 double ReadGain(const Node& node) {
@@ -76,7 +77,7 @@ void ReadGeodetic(const Node& node, TableField& field) {
                        (field.reciprocal ? " of reciprocals" : ""),
                    "columns: latitude, longitude and perhaps height");
   }
-  const double degree = *DataUnitFactor("deg");
+  const double degree = ParseDataUnit("deg")->factor;
   for (std::size_t i = 0; i < 2; ++i) field.conversions[i].unit = degree;
 }
 
@@ -85,7 +86,7 @@ void ReadConversions(const Node& node, TableField& field) {
   field.conversions.resize(field.columns.size());
   if (const auto reciprocal = node.Find("reciprocal")) field.reciprocal = reciprocal->Flag();
   ReadGeodetic(node, field);
-  ReadForEachColumn(node, "unit", field, [](auto& c, const Node& n) { c.unit = ReadUnit(n); });
+  ReadForEachColumn(node, "unit", field, [](auto& c, const Node& n) { ReadUnit(n, c); });
   ReadForEachColumn(node, "gain", field, [](auto& c, const Node& n) { c.gain = ReadGain(n); });
   ReadForEachColumn(node, "offset", field, [&](auto& c, const Node& n) {
     c.offset = ReadOffset(n, field.reciprocal ? 1.0 : c.unit);

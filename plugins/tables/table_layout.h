@@ -59,6 +59,7 @@ struct CovarianceColumns {
 /// reciprocal. u is the value of the unit in SI units.
 struct Conversion {
   double unit = 1.0, gain = 1.0, offset = 0.0;
+  std::optional<Node> unit_node = {};  ///< node of the config with the unit
 };
 
 /// Stream or true value: numbers of each row that the conditions select.

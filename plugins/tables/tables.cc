@@ -2,6 +2,7 @@
 #include "tables.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <filesystem>
@@ -13,6 +14,10 @@
 #include <vector>
 
 #include "alidade/base/number_text.h"
+#include "alidade/base/text.h"
+#include "alidade/io/log.h"
+#include "alidade/io/near_file.h"
+#include "data_unit.h"
 #include "field_values.h"
 #include "known_table.h"
 #include "local_frame.h"
@@ -65,6 +70,25 @@ class TablesSource : public Source {
   }
   Place place() const override { return place_; }
   std::optional<Config> Calibration() const override { return calibration_.Get(); }
+
+  void CheckUnits(std::size_t stream, const std::vector<std::string>& units,
+                  const std::string& quantity) const override {
+    const auto next = std::ranges::upper_bound(tables_, stream, {},
+                                               [](const Table& t) { return t.first_stream; });
+    const Table& table = *std::prev(next);
+    const TableField& field = table.reader->layout().streams[stream - table.first_stream];
+    if (field.geodetic || field.reciprocal) return;
+    for (std::size_t i = 0; i < field.conversions.size(); ++i) {
+      const Conversion& conversion = field.conversions[i];
+      const std::optional<DataUnit> expected = ParseDataUnit(units[i]);
+      if (!expected || !conversion.unit_node || std::abs(conversion.gain) != 1.0) continue;
+      const std::string unit = conversion.unit_node->Text();
+      if (ParseDataUnit(unit)->dimensions == expected->dimensions) continue;
+      conversion.unit_node->Fail(
+          "'" + unit + "' cannot be converted to " + units[i] + ", the unit of " + quantity,
+          "a unit of the same dimension, or a gain that converts the dimension");
+    }
+  }
 
   bool Next(SourceFrame& frame) override {
     while (!HasCompleteFrame()) {

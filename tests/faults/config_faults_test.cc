@@ -276,6 +276,27 @@ const Fault kBlockFaults[] = {
               {After(kTemplateBlocks, "    size: 2"), {"mean: 3.3", "mean: [3.3, 1]"}}, 26,
               "block 'template.inverse_distance' has geometry vector(2); expected vector(1) for "
               "role 'inverse_distance' of model 'scale_2d'"),
+    MakeFault(
+        "44_unit_of_a_stream", "depth",
+        {{kDepthSource,
+          "{type: tables, path: rows.csv,\n  streams: {inverse_scale: s, disparity: {columns: "
+          "d,\n    unit: deg}}}"}},
+        30,
+        "source.streams.disparity.unit: 'deg' cannot be converted to px, the unit of sensor "
+        "'stereo'; expected a unit of the same dimension, or a gain that converts"),
+    MakeFault(
+        "44_unit_of_a_control_input", "depth",
+        {{"  template:\n",
+          "  vehicle:\n    model: formula\n    blocks: {p: number}\n"
+          "    inputs: {v: number}\n    input: {stream: speed}\n"
+          "    units: {p: m, v: m/s}\n    rate: {p: v}\n    noise: {}\n"
+          "    initial: {p: {mean: 0, sigma: 1}}\n  template:\n"},
+         {kDepthSource,
+          "{type: tables, path: rows.csv, streams: {inverse_scale: s, disparity: d,\n    "
+          "speed: {columns: d, unit: deg}}}"}},
+        38,
+        "source.streams.speed.unit: 'deg' cannot be converted to m/s, the unit of the control "
+        "input of 'vehicle'"),
     MakeFault("44_truth_of_another_size", "depth",
               {{kDepthSource, Rows("truth: {depth_rate: s,\n  target.depth: [d, s]}")}}, 29,
               "source.truth.target.depth: the truth does not match a block: target.depth has size "

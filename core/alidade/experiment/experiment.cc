@@ -86,6 +86,35 @@ std::vector<Segment> ReadSegments(const Node& root, const Problem& problem,
   return segments;
 }
 
+/// Returns the unit of each ambient element, or "" for an element without a unit.
+std::vector<std::string> ElementUnits(const Space& space) {
+  std::vector<std::string> units;
+  std::size_t part_index = 0;
+  space.geometry.ForEachPart([&](const Geometry& part, int, int) {
+    std::string unit = space.part_units.empty() ? space.unit : space.part_units[part_index++];
+    if (!part.is_vector() && !part.is_angle()) unit.clear();
+    units.insert(units.end(), static_cast<std::size_t>(part.ambient), unit);
+  });
+  return units;
+}
+
+/// Rejects a stream whose unit differs in dimension from that of the measurement or control input.
+void CheckUnits(const Source& source, const Problem& problem) {
+  const auto check = [&](const std::string& stream, const Space& space, const std::string& owner) {
+    const auto found = std::ranges::find(source.streams(), stream, &StreamInfo::name);
+    const auto index = static_cast<std::size_t>(found - source.streams().begin());
+    source.CheckUnits(index, ElementUnits(space), owner);
+  };
+  for (const SensorBinding& sensor : problem.sensors) {
+    check(sensor.stream, sensor.model->measurement(), "sensor '" + sensor.name + '\'');
+  }
+  for (const MotionBinding& motion : problem.motions) {
+    if (!motion.model->has_input()) continue;
+    check(motion.input.stream, motion.model->input(),
+          "the control input of '" + motion.name + '\'');
+  }
+}
+
 /// Returns the maps of true values in the config: that of the source and those of its files.
 std::vector<Node> TruthMaps(const Node& source) {
   std::vector<Node> entries = {source};
@@ -333,6 +362,10 @@ Experiment BuildExperiment(const Config& written, const PluginHost& host) {
   experiment.truth_sigmas =
       ReadTruthSigmas(root, experiment.source->truths(), experiment.reference < 0);
   CheckTruths(source, experiment, full_problem);
+  CheckUnits(*experiment.source, full_problem);
+  for (const EstimatorSpec& spec : experiment.estimators) {
+    CheckUnits(*experiment.source, spec.problem);
+  }
   root.RejectUnread();
   return experiment;
 }

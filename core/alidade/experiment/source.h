@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -63,6 +64,11 @@ class Source {
   virtual const std::vector<StreamInfo>& streams() const = 0;
   /// Describes the true values that the source provides. Each truth has the name of its block.
   virtual const std::vector<StreamInfo>& truths() const = 0;
+  /// Rejects a stream whose unit, if the source knows it, cannot be converted to the unit of the
+  /// quantity that reads the stream. `units` contains the unit of each value, or "" if there is no
+  /// unit. Must not be called after the config of the source is destroyed. Errors: kBadConfig.
+  virtual void CheckUnits(std::size_t /*stream*/, const std::vector<std::string>& /*units*/,
+                          const std::string& /*quantity*/) const {}
   /// Reads the next frame. Returns false at the end. The streams of the measurements must be
   /// indices into streams(). All values must have the sizes that streams() and truths() state. Any
   /// other frame ends the run with an internal error. Errors: kBadData, kIo.

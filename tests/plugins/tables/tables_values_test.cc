@@ -2,6 +2,7 @@
 //
 // Tests what a stream reads from a row: units, covariances, ids, conditions, geodetic positions.
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "plugins/tables/data_unit.h"
@@ -13,7 +14,9 @@ namespace {
 using Text = std::vector<std::string>;
 
 TEST(DataUnit, HasTheFactorsOfTheStandards) {
-  const auto factor = [](const char* unit) { return DataUnitFactor(unit).value_or(-1.0); };
+  const auto factor = [](const char* unit) {
+    return ParseDataUnit(unit).value_or(DataUnit{-1.0, {}}).factor;
+  };
   EXPECT_DOUBLE_EQ(factor("deg"), std::numbers::pi / 180.0);
   EXPECT_DOUBLE_EQ(factor("deg/s"), std::numbers::pi / 180.0);
   EXPECT_DOUBLE_EQ(factor("g"), 9.80665);
@@ -29,8 +32,49 @@ TEST(DataUnit, HasTheFactorsOfTheStandards) {
   EXPECT_DOUBLE_EQ(factor("hPa"), 100.0);
   EXPECT_DOUBLE_EQ(factor("gauss"), 100.0) << "uT, as sensor magnetometer";
   for (const char* unit : {"", "furlong", "m/", "/s", "m s", "DEGREE"}) {
-    EXPECT_FALSE(DataUnitFactor(unit)) << unit;
+    EXPECT_FALSE(ParseDataUnit(unit)) << unit;
   }
+}
+
+TEST(DataUnit, HasTheDimensionsOfItsFactors) {
+  const auto dimensions = [](const char* unit) { return ParseDataUnit(unit)->dimensions; };
+  using Dimensions = std::map<std::string, int>;
+  EXPECT_EQ(dimensions("km/h"), (Dimensions{{"m", 1}, {"s", -1}}));
+  EXPECT_EQ(dimensions("kn"), dimensions("m/s"));
+  EXPECT_EQ(dimensions("g"), (Dimensions{{"m", 1}, {"s", -2}}));
+  EXPECT_EQ(dimensions("mm/s/s"), dimensions("m/s^2"));
+  EXPECT_EQ(dimensions("m/g"), (Dimensions{{"s", 2}}));
+  EXPECT_EQ(dimensions("rpm"), dimensions("deg/s"));
+  EXPECT_EQ(dimensions("gauss"), dimensions("uT"));
+  EXPECT_EQ(dimensions("percent"), Dimensions{});
+  EXPECT_NE(dimensions("deg"), dimensions("deg/s"));
+}
+
+TEST_F(Tables, RejectsAUnitOfAnotherDimension) {
+  Write("t_s,v,w\n0,90,36\n");
+  const auto check = [&](const std::string& keys, const Text& units) {
+    Open("path: a.csv\nstreams: {other: v, drive: {columns: [v, w], " + keys + "}}\n")
+        ->CheckUnits(1, units, "sensor 's'");
+  };
+  const std::string expected =
+      "the unit of sensor 's'; expected a unit of the same dimension, or a gain that converts the "
+      "dimension";
+  ExpectError(ExitCode::kBadConfig,
+              "run.yaml:2:52 streams.drive.unit: 'deg' cannot be converted to m/s, " + expected,
+              [&] {
+                check("unit: deg", {"m/s", "rad"});
+              });
+  ExpectError(ExitCode::kBadConfig,
+              "run.yaml:2:57 streams.drive.unit[1]: 'm/s' cannot be converted to rad, " + expected,
+              [&] {
+                check("unit: [kn, m/s]", {"m/s", "rad"});
+              });
+  check("unit: [km/h, deg], gain: -1", {"m/s", "rad"});
+  check("unit: [rpm, deg], gain: [0.3, 1]", {"m/s", "rad"});  // the gain is the radius of a wheel
+  check("unit: deg", {"", "rad"});
+  check("unit: deg, reciprocal: true", {"m", "m"});
+  check("unit: deg, geodetic: true", {"m", "m"});
+  check("gain: 2", {"m/s", "rad"});
 }
 
 TEST_F(Tables, ConvertsUnitsGainsAndOffsets) {

@@ -56,6 +56,14 @@ std::string InFiles(const std::string& keys) {
          keys + "}]}";
 }
 
+/// Returns a change that adds a sensor with equations. Its first line is line 22, and the first of
+/// `lines` is line 24.
+Change WithFormula(const std::string& lines) {
+  return After(kStereoSigma,
+               "  offset:\n    model: formula\n" + lines +
+                   "    stream: disparity\n    roles: {depth: target.depth}\n    sigma: {d: 1}");
+}
+
 const Fault kTextFaults[] = {
     MakeFault("01_duplicate_key", "depth", {After("focal_px: 400", "    focal_px: 401")}, 20,
               "focal_px: duplicate key; the first one is at line 19"),
@@ -276,6 +284,12 @@ const Fault kBlockFaults[] = {
               {After(kTemplateBlocks, "    size: 2"), {"mean: 3.3", "mean: [3.3, 1]"}}, 26,
               "block 'template.inverse_distance' has geometry vector(2); expected vector(1) for "
               "role 'inverse_distance' of model 'scale_2d'"),
+    MakeFault("44_unit_of_a_formula_is_unknown", "depth",
+              {WithFormula("    units: {d: mps}\n    z: {d: depth}\n")}, 24,
+              "sensors.offset.units.d: 'mps' is not a unit; expected an SI unit such as m, rad, "),
+    MakeFault("44_unit_of_a_formula_is_not_si", "depth",
+              {WithFormula("    units: {d: km/h}\n    z: {d: depth}\n")}, 24,
+              "sensors.offset.units.d: 'km/h' is not an SI unit; expected an SI unit such as m, "),
     MakeFault(
         "44_unit_of_a_stream", "depth",
         {{kDepthSource,

@@ -2,8 +2,12 @@
 #include "alidade/formula/formula_keys.h"
 
 #include <algorithm>
+#include <iterator>
+#include <string_view>
 
 #include "alidade/base/text.h"
+#include "alidade/config/tree.h"
+#include "alidade/config/unit.h"
 #include "alidade/state/element_names.h"
 
 namespace alidade::internal {
@@ -18,6 +22,25 @@ std::vector<std::string> GeometryNames() {
     if (row->ambient > 0) names.emplace_back(row->name);
   }
   return names;
+}
+
+/// Rejects a unit that is unknown, or that is not an SI unit. Formulas compute in SI units.
+void CheckUnit(const Node& node) {
+  constexpr std::string_view kOtherUnits[] = {"1", "A", "K", "N", "Pa", "J", "W", "V", "T", "uT"};
+  constexpr const char* kExpected = "an SI unit such as m, rad, m/s, kg/m^3 or uT";
+  const std::string text = node.Text();
+  for (std::string_view remaining = text;;) {
+    const std::size_t end = std::min(remaining.find('/'), remaining.size());
+    const std::string_view factor = remaining.substr(0, end);
+    const std::string_view base = factor.substr(0, factor.find('^'));
+    const auto unit = ParseUnit(base);
+    if (!unit && std::ranges::find(kOtherUnits, base) == std::end(kOtherUnits)) {
+      node.Fail(Quoted(text) + " is not a unit", kExpected);
+    }
+    if (unit && unit->factor != 1.0) node.Fail(Quoted(text) + " is not an SI unit", kExpected);
+    if (end == remaining.size()) return;
+    remaining.remove_prefix(end + 1);
+  }
 }
 
 std::vector<std::pair<std::string, Node>> EntriesOf(const Node& entry, const char* key,
@@ -89,7 +112,9 @@ Space FormulaKeys::ReadSpace(const std::string& name, const Node& node) const {
 
 std::string FormulaKeys::UnitOf(const std::string& name, const Geometry& geometry) const {
   const auto unit = units_ ? units_->Find(name) : std::nullopt;
-  return unit ? unit->Text() : geometry.is_angle() ? "rad" : "";
+  if (!unit) return geometry.is_angle() ? "rad" : "";
+  CheckUnit(*unit);
+  return unit->Text();
 }
 
 void FormulaKeys::DeclareSpaces(const std::vector<Space>& spaces, int first, Scope& scope) const {

@@ -34,6 +34,8 @@ class TableReader {
   /// Returns true if the row that Read() read last was not released yet.
   bool has_row() const { return has_row_; }
   bool is_at_end() const { return is_at_end_; }
+  /// Returns true if ReleaseRow() was called.
+  bool has_begun() const { return rows_ > 0; }
   /// Returns the last row. It is valid until the next call of Read().
   const TableRow& row() const { return row_; }
   /// Returns the time of the last row.

@@ -185,6 +185,9 @@ class TablesSource : public Source {
     if (first == nullptr) return false;
     if (!std::exchange(has_rows_, true)) CheckFirstTimes(*first);
     const Timestamp timestamp = first->timestamp();
+    if (!first->has_begun()) WarnOfGap(*first);
+    if (first_time_ == kNoTimestamp) first_time_ = timestamp;
+    last_time_ = std::max(last_time_, timestamp);
     for (const Table& table : tables_) {
       TableReader& reader = *table.reader;
       while (reader.has_row() && reader.timestamp() == timestamp) {
@@ -213,6 +216,29 @@ class TablesSource : public Source {
                         "the same origin of all times: the unit of this column, such as 'time: "
                         "{unit: ns}', or an 'offset_s'");
     }
+  }
+
+  /// Logs a warning if the first row of `next` follows a gap that no table spans, and that is
+  /// longer than all rows before it together.
+  void WarnOfGap(const TableReader& next) const {
+    constexpr double kMinGap = 60.0;
+    std::vector<std::string> names;
+    for (const Table& table : tables_) {
+      const TableReader& reader = *table.reader;
+      if (reader.has_begun() && !reader.is_at_end()) return;
+      if (reader.has_begun()) names.push_back(reader.name());
+    }
+    // The difference of two timestamps can exceed the range of a Timestamp.
+    const double begin_s = Seconds(first_time_), end_s = Seconds(last_time_);
+    const double gap_s = Seconds(next.timestamp()) - end_s;
+    if (names.empty() || gap_s <= kMinGap || gap_s <= end_s - begin_s) return;
+    Log(LogLevel::kWarning,
+        ErrorLine(Place{next.name(), next.row().number(), 0}, "",
+                  "the first time is " + internal::SecondsText(next.timestamp()) +
+                      ", but the times of " + internal::Join(names) + " are " +
+                      internal::SecondsText(first_time_) + " to " +
+                      internal::SecondsText(last_time_),
+                  "times that overlap; check 'time.unit' and 'time.offset_s' of these files"));
   }
 
   void AddRow(const Table& table) {
@@ -263,7 +289,8 @@ class TablesSource : public Source {
   std::vector<StreamInfo> streams_, truths_;
   std::vector<Timestamp> last_rows_;  ///< time of the last used row of each stream
   std::vector<Table> tables_;
-  std::deque<PendingFrame> frames_;  ///< in the order of time
+  Timestamp first_time_ = kNoTimestamp, last_time_ = kNoTimestamp;  ///< of the rows read so far
+  std::deque<PendingFrame> frames_;                                 ///< in the order of time
   Place place_;
   bool has_rows_ = false;  ///< true if the first rows of all tables were read
 };

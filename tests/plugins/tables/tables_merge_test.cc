@@ -7,6 +7,7 @@
 
 #include <thread>
 
+#include "alidade/io/log.h"
 #include "tables_fixture.h"
 
 namespace alidade::testing {
@@ -197,6 +198,40 @@ TEST_F(Tables, AnOffsetMovesAllTimesOfATable) {
 }
 
 // ---- gaps ---------------------------------------------------------------------------------------
+
+TEST_F(Tables, FilesWhoseTimesDoNotOverlapAreAWarning) {
+  const auto warnings = [&] {
+    Text texts;
+    const LogSubscription log(LogLevel::kWarning,
+                              [&](LogLevel, std::string_view text) { texts.emplace_back(text); });
+    Frames(
+        "files: [{path: a.csv, streams: {x: x}}, {path: b.csv, streams: {y: y}}, "
+        "{path: c.csv, time: {unit: ms}, streams: {z: z}}]\n");
+    return texts;
+  };
+  const std::string a = File().string(), b = (folder_ / "b.csv").string(),
+                    c = (folder_ / "c.csv").string();
+  const std::string expected =
+      "; expected times that overlap; check 'time.unit' and 'time.offset_s' of these files";
+  Write("a.csv", "t_s,x\n10,1\n100,2\n");
+  Write("b.csv", "t_s,y\n20000,1\n90000,2\n");  // in ms
+  Write("c.csv", "t_s,z\n11000,1\n");
+  EXPECT_EQ(warnings(), Text{b + ":2: the first time is 20000.000000 s, but the times of " + a +
+                             ", " + c + " are 10.000000 s to 100.000000 s" + expected});
+  Write("b.csv", "t_s,y\n0.1,1\n0.2,2\n");
+  Write("a.csv", "t_s,x\n110,1\n200,2\n");
+  Write("c.csv", "t_s,z\n120000,1\n");
+  EXPECT_EQ(warnings(), Text{a + ":2: the first time is 110.000000 s, but the times of " + b +
+                             " are 0.100000 s to 0.200000 s" + expected});
+  // There is no warning of a gap that is shorter than a minute or than the rows before it, or that
+  // another file spans.
+  Write("b.csv", "t_s,y\n55,1\n56,2\n");
+  EXPECT_EQ(warnings(), Text{});
+  Write("b.csv", "t_s,y\n285,1\n");
+  EXPECT_EQ(warnings(), Text{}) << "a begins at 110 s and ends at 200 s";
+  Write("b.csv", "t_s,y\n0,1\n1000,2\n");
+  EXPECT_EQ(warnings(), Text{});
+}
 
 TEST_F(Tables, EpochTimesInTwoFormsAreMerged) {
   Write("a.csv", "t,x\n1403715273262142976,1\n1403715273462142976,2\n");

@@ -20,11 +20,13 @@ class LocalFrame {
   /// If there is no `origin`, the first position that is converted becomes the origin.
   explicit LocalFrame(const std::optional<GeodeticPosition>& origin);
 
-  /// Returns the coordinates of `position` in this frame: east, north and up, in m.
+  /// Returns the coordinates of `position` in this frame: east, north and up, in m. Logs a warning
+  /// if the first position is far from the origin.
   std::array<double, 3> FromGeodetic(const GeodeticPosition& position);
 
  private:
   std::optional<GeographicLib::LocalCartesian> frame_;
+  bool has_position_ = false;  ///< true if a position was converted
 };
 
 }  // namespace alidade

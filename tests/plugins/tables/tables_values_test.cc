@@ -5,6 +5,7 @@
 #include <map>
 #include <numbers>
 
+#include "alidade/io/log.h"
 #include "plugins/tables/data_unit.h"
 #include "tables_fixture.h"
 
@@ -279,6 +280,24 @@ TEST_F(Tables, AnOriginMayBeGiven) {
   EXPECT_NEAR(frames[1].measurements[0].values[0], expected[0], 1e-6);
   EXPECT_NEAR(frames[1].measurements[0].values[1], expected[1], 1e-6);
   EXPECT_NEAR(frames[1].truth[0][2], Enu(48.1379, 11.5731, 523.0, 48.0, 11.5, 500.0)[2], 1e-6);
+}
+
+TEST_F(Tables, AFirstPositionFarFromTheOriginIsAWarning) {
+  Write(kFixes);
+  const auto warnings = [&](const std::string& latitude_deg, const std::string& longitude_deg) {
+    std::vector<std::string> texts;
+    const LogSubscription log(LogLevel::kWarning,
+                              [&](LogLevel, std::string_view text) { texts.emplace_back(text); });
+    Frames("path: a.csv\norigin: {latitude_deg: " + latitude_deg + ", longitude_deg: " +
+           longitude_deg + "}\nstreams: {gps: {columns: [lat, lon], geodetic: true}}\n");
+    return texts;
+  };
+  EXPECT_EQ(warnings("48.9", "11.5").size(), 0u) << "85 km";
+  EXPECT_EQ(warnings("49.1", "11.5").size(), 1u) << "107 km";
+  // On a sphere of 6371 km, the angle between the positions is 47.6 deg, and the chord 5140 km.
+  EXPECT_EQ(warnings("11.575", "48.137"),
+            Text{"the first geodetic position is 5135 km from `origin`; are latitude and longitude "
+                 "exchanged, in the columns or in `origin`?"});
 }
 
 TEST_F(Tables, AGainScalesGeodeticDegrees) {

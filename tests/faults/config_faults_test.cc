@@ -240,6 +240,10 @@ const Fault kBlockFaults[] = {
     MakeFault("25_name_of_a_block", "depth", {{"position: depth", "position: \"depth,m\""}}, 5,
               "state.target.blocks.position: 'depth,m' is not a valid name for a block; expected "
               "letters, digits, _ and -"),
+    MakeFault("03_initial_of_an_owned_state_missing", "depth",
+              {WithFormula("    owns:\n      bias: number\n    z: {d: depth + bias}\n")}, 25,
+              "sensors.offset.owns.bias: the state has no initial value; expected initial: {bias: "
+              "{mean: 0, sigma: 0.1}}, or constant: [bias], which is exactly 0\n"),
     MakeFault("25_name_of_a_block_with_a_line_end", "depth",
               {{"velocity: depth_rate", R"(velocity: "depth\nrate")"}}, 5,
               R"('depth\nrate' is not a valid name for a block)"),

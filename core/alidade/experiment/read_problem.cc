@@ -299,7 +299,10 @@ class OwnedStateReader {
 
  public:
   OwnedStateReader(std::string name, const Node& entry, const Node& roles, const SensorModel& model)
-      : name_(std::move(name)), entry_(entry), offset_(entry.Find("time_offset_s")) {
+      : name_(std::move(name)),
+        entry_(entry),
+        is_of_config_(internal::HasEquationsInConfig(model.name())),
+        offset_(entry.Find("time_offset_s")) {
     std::vector<std::string> owned;
     for (const Space& role : model.roles()) {
       if ((role.flags & ALIDADE_ROLE_OWNED) != 0 && !roles.Find(role.name)) {
@@ -329,6 +332,12 @@ class OwnedStateReader {
                          : initial_ ? initial_->Find(role.name)
                                     : std::nullopt;
     const bool is_considered = Contains(considered_, role.name);
+    if (is_of_config_ && !is_offset && !initial && !Contains(constant_, role.name)) {
+      entry_.At("owns").At(role.name).Fail(
+          "the state has no initial value",
+          "initial: {" + role.name + ": " + InitialExample(role) + "}, or constant: [" + role.name +
+              "], which is exactly " + (role.geometry.ambient > 1 ? "the neutral element" : "0"));
+    }
     const bool is_constant =
         Contains(constant_, role.name) || (!initial && owned.sqrt_prior.empty());
     if (is_considered && is_constant) {
@@ -390,6 +399,7 @@ class OwnedStateReader {
 
   std::string name_;
   Node entry_;
+  bool is_of_config_;  ///< true if the config declares the states, which then have no default
   bool has_read_state_ = false;
   std::optional<Node> offset_, initial_, dynamics_;
   std::vector<std::string> considered_, constant_;

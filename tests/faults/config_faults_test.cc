@@ -244,6 +244,13 @@ const Fault kBlockFaults[] = {
               {WithFormula("    owns:\n      bias: number\n    z: {d: depth + bias}\n")}, 25,
               "sensors.offset.owns.bias: the state has no initial value; expected initial: {bias: "
               "{mean: 0, sigma: 0.1}}, or constant: [bias], which is exactly 0\n"),
+    MakeFault(
+        "03_key_that_resembles_another_key", "depth",
+        {{"  template:\n",
+          "  car:\n    model: coordinated_turn\n    noise: {acceleration: 1}\n  template:\n"}},
+        12,
+        "state.car.noise.angular_acceleration: missing; model 'coordinated_turn' needs it "
+        "(rad/s^1.5, >= 0: root of the spectral density of the angular acceleration)\n"),
     MakeFault("25_name_of_a_block_with_a_line_end", "depth",
               {{"velocity: depth_rate", R"(velocity: "depth\nrate")"}}, 5,
               R"('depth\nrate' is not a valid name for a block)"),

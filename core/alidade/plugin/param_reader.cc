@@ -294,8 +294,9 @@ ParamReader::ParamReader(const Node& entry, std::string owner, std::string repre
 
 void ParamReader::Check() const {
   if (exception_) std::rethrow_exception(exception_);
-  if (errors_.empty()) return;
-  std::vector<std::string> lines(errors_.begin(), errors_.end());
+  if (errors_.empty() && missing_.empty()) return;
+  std::vector<std::string> lines = errors_;
+  for (const MissingKey& missing : missing_) lines.push_back(TextOfMissing(missing));
   const auto by_place = [](const std::string& a, const std::string& b) {
     return strverscmp(a.c_str(), b.c_str()) < 0;
   };
@@ -312,6 +313,8 @@ std::int32_t ParamReader::Read(void* context, const AlidadeParam* param, double*
         reader->Values(reader->Expect([&] { return CheckParam(param, values, capacity); }));
     std::copy_n(read.begin(), std::min(std::ssize(read), std::ptrdiff_t{capacity}), values);
     return static_cast<std::int32_t>(read.size());
+  } catch (const MissingKey& missing) {
+    reader->missing_.push_back(missing);
   } catch (const Error& e) {
     reader->errors_.emplace_back(e.what());
   }
@@ -327,6 +330,8 @@ std::int32_t ParamReader::ReadText(void* context, const AlidadeParam* param, cha
   try {
     const AlidadeParam expected = reader->Expect([&] { return CheckParam(param, text, capacity); });
     return CopyText(reader->TextOf(expected), text);
+  } catch (const MissingKey& missing) {
+    reader->missing_.push_back(missing);
   } catch (const Error& e) {
     reader->errors_.emplace_back(e.what());
   }
@@ -417,7 +422,7 @@ std::string ParamReader::TextOf(const AlidadeParam& param) const {
   Node map = BaseOf(key);
   const std::optional<Node> node = FindBelow(map, key);
   if (!node && HasFallback(param)) return Text(param.fallback_text);
-  if (!node) FailMissing(param, map, key);
+  if (!node) throw MissingKey(map, key, Meaning(param));
   const std::string text = node->Text();
   const std::string defect = TextDefect(text.c_str());
   if (!defect.empty()) node->Fail("the text " + defect);
@@ -474,14 +479,13 @@ std::vector<double> ParamReader::Absent(const AlidadeParam& param, const Node& m
   const std::optional<Node> data = InCalibration(param.key);
   if (data && (is_dotted || !HasFallback(param))) return ReadValues(param, *data);
   if (HasFallback(param)) return Fallback(param);
-  FailMissing(param, map, key_in_map);
+  throw MissingKey(map, key_in_map, Meaning(param));
 }
 
-void ParamReader::FailMissing(const AlidadeParam& param, const Node& map,
-                              const std::string& key_in_map) const {
-  const std::string first = key_in_map.substr(0, key_in_map.find('.'));
+std::string ParamReader::TextOfMissing(const MissingKey& missing) const {
+  const std::string first = missing.key.substr(0, missing.key.find('.'));
   try {
-    static_cast<void>(map.At(first));
+    static_cast<void>(missing.map.At(first));
   } catch (const Error& e) {
     // The message of the config may suggest a similar key, or a key with another unit. This
     // suggestion is retained.
@@ -489,13 +493,13 @@ void ParamReader::FailMissing(const AlidadeParam& param, const Node& map,
     std::string text = e.what();
     const std::size_t position = text.find(kPhrase);
     if (position != std::string::npos) {
-      text.replace(
-          position, kPhrase.size(),
-          key_in_map.substr(first.size()) + ": missing; " + owner_ + " needs it " + Meaning(param));
+      text.replace(position, kPhrase.size(),
+                   missing.key.substr(first.size()) + ": missing; " + owner_ + " needs it " +
+                       missing.meaning);
     }
-    throw Error(ExitCode::kBadConfig, text);
+    return text;
   }
-  throw ContractViolation("the existing key '" + key_in_map + "' was reported as missing");
+  throw ContractViolation("the existing key '" + missing.key + "' was reported as missing");
 }
 
 ParamRecorder::ParamRecorder() : host_(MakeHost(this)), trials_(1) {

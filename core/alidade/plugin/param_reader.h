@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include "alidade/config/config.h"
@@ -54,6 +55,16 @@ class ParamReader {
   void Check() const;
 
  private:
+  /// Required key that the config does not contain. Its message is composed after all keys were
+  /// requested, so that it does not suggest to rename one of them.
+  struct MissingKey : std::exception {
+    MissingKey(const Node& parent, std::string name, std::string text)
+        : map(parent), key(std::move(name)), meaning(std::move(text)) {}
+    Node map;             ///< map that should contain the key
+    std::string key;      ///< the key in `map`, which may contain dots
+    std::string meaning;  ///< unit, range and description of the parameter
+  };
+
   static std::int32_t Read(void* context, const AlidadeParam* param, double* values,
                            std::int32_t capacity) noexcept;
   static std::int32_t ReadText(void* context, const AlidadeParam* param, char* text,
@@ -69,8 +80,7 @@ class ParamReader {
                         const std::vector<double>& values) const;
   std::vector<double> Absent(const AlidadeParam& param, const Node& map,
                              const std::string& key_in_map) const;
-  [[noreturn]] void FailMissing(const AlidadeParam& param, const Node& map,
-                                const std::string& key_in_map) const;
+  std::string TextOfMissing(const MissingKey& missing) const;
 
   Node entry_;
   std::string owner_, representation_;
@@ -80,6 +90,7 @@ class ParamReader {
   AlidadeHost host_{};
   std::unordered_set<std::string> keys_;  ///< all requested keys
   std::vector<std::string> errors_;
+  std::vector<MissingKey> missing_;
   std::string failure_;
   /// Exception that a call caught. It is stored because it must not propagate into the plugin.
   std::exception_ptr exception_;

@@ -251,6 +251,13 @@ const Fault kBlockFaults[] = {
         12,
         "state.car.noise.angular_acceleration: missing; model 'coordinated_turn' needs it "
         "(rad/s^1.5, >= 0: root of the spectral density of the angular acceleration)\n"),
+    MakeFault(
+        "03_sigma_is_a_list_of_another_size", "depth",
+        {After(kTemplateBlocks, "    size: 2"),
+         {"{mean: 3.3, sigma: 0.5}", "{mean: [3, 1],\n  sigma: [0.5]}"}},
+        15,
+        "state.template.initial.inverse_distance.sigma: the list has 1 element; expected 2, or one "
+        "number for all elements"),
     MakeFault("25_name_of_a_block_with_a_line_end", "depth",
               {{"velocity: depth_rate", R"(velocity: "depth\nrate")"}}, 5,
               R"('depth\nrate' is not a valid name for a block)"),

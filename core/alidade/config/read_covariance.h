@@ -19,14 +19,15 @@ std::vector<double> ReadCovariance(const Node& node, int size);
 std::vector<double> ReadSqrtCovariance(const Node& node, int size);
 std::vector<double> ReadSqrtR(const Node& node, int size);
 
-/// Repeats the value of a list of one value. Rejects any other list that does not have `size`
-/// values.
+/// Repeats a single value that is not in a list. Rejects other values unless there are `size`.
 template <class T>
 void RepeatTo(int size, const Node& node, std::vector<T>& values) {
   const auto count = static_cast<std::size_t>(size);
-  if (values.size() == 1) values.assign(count, T(values[0]));
+  const bool is_single = values.size() == 1 && node.kind() != Node::Kind::kList;
+  if (is_single) values.assign(count, T(values[0]));
   if (values.size() == count) return;
-  node.Fail("the list has " + std::to_string(values.size()) + " elements",
+  node.Fail("the list has " + std::to_string(values.size()) +
+                (values.size() == 1 ? " element" : " elements"),
             std::to_string(size) + ", or one number for all elements");
 }
 

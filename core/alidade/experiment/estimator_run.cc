@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <iterator>
+#include <numbers>
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/text.h"
@@ -105,6 +107,24 @@ void EstimatorRun::AddEvents(const std::vector<Event>& events) {
 
 namespace {
 
+/// Returns an event `unit` for each angle whose prior may be in degrees: whose mean or sigma is
+/// larger than a revolution.
+std::vector<Event> AngleEvents(const Problem& problem) {
+  constexpr double kRevolution = 2.0 * std::numbers::pi;
+  std::vector<Event> events;
+  for (const Prior& prior : problem.priors) {
+    const Block& block = problem.layout[prior.block];
+    if (!block.geometry().is_angle() || prior.mean.empty()) continue;
+    const double sigma = std::sqrt(prior.covariance(0, 0));
+    if (std::abs(prior.mean[0]) <= kRevolution && sigma <= kRevolution) continue;
+    events.push_back({kNoTimestamp, EventKind::kUnit,
+                      "the initial value of angle '" + block.name + "' is " +
+                          RoundedText(prior.mean[0]) + " rad +- " + RoundedText(sigma) +
+                          " rad, more than a revolution; is it in deg?"});
+  }
+  return events;
+}
+
 /// Returns the result of an estimator before the first frame.
 EstimatorResult InitialResult(const EstimatorSpec& spec, const Experiment& experiment) {
   EstimatorResult result;
@@ -120,6 +140,7 @@ EstimatorResult InitialResult(const EstimatorSpec& spec, const Experiment& exper
   result.sensors = NamesOf(spec.problem.sensors);
   const BlockId position = PositionBlockOf(spec.problem);
   if (position >= 0) result.position_block = spec.problem.layout[position].name;
+  result.events = AngleEvents(spec.problem);
   result.unobservable = UnobservableDirections(spec.problem);
   if (!IsObservabilityComputed(spec.problem)) {
     result.events.push_back({kNoTimestamp, EventKind::kObservability,

@@ -354,7 +354,8 @@ class Turning : public testing::SwingingTarget {
   int k_ = 0;
 };
 
-std::vector<std::string> UnitEventsOf(const Turning& source, double gate) {
+std::vector<std::string> UnitEventsOf(const Turning& source, double gate, double mean = 0.6,
+                                      double variance = 0.01) {
   Experiment experiment;
   experiment.source = std::make_unique<Turning>(source);
   EstimatorSpec& named = experiment.estimators.emplace_back();
@@ -362,7 +363,7 @@ std::vector<std::string> UnitEventsOf(const Turning& source, double gate) {
   const SharedMotion model = MakeMotion(Turn(), "turn");
   const BlockId id = named.problem.layout.Declare("car.heading", "car", model->blocks()[0]);
   named.problem.motions.push_back({"car", model, {id}});
-  named.problem.priors.push_back({id, {0.6}, Eigen::MatrixXd::Constant(1, 1, 0.01), {}});
+  named.problem.priors.push_back({id, {mean}, Eigen::MatrixXd::Constant(1, 1, variance), {}});
   testing::AddSensor(named.problem, "disparity", MakeSensor(Compass(), "compass"), {"car.heading"});
   EkfOptions options;
   options.gate = gate;
@@ -395,6 +396,19 @@ TEST(Run, RadiansAreNoEvent) {
       }
     }
   }
+}
+
+TEST(Run, AnInitialAngleBeyondARevolutionIsAnEvent) {
+  const Turning source(0.3, 1.0, true);
+  const auto events = [&](double mean, double sigma) {
+    return UnitEventsOf(source, 1.0, mean, sigma * sigma);
+  };
+  EXPECT_EQ(events(90.0, 60.0), std::vector<std::string>{
+                                    "the initial value of angle 'car.heading' is 90 rad +- 60 rad, "
+                                    "more than a revolution; is it in deg?"});
+  EXPECT_EQ(events(0.6, 30.0).size(), 1u);
+  EXPECT_EQ(events(-6.3, 0.1).size(), 1u) << "2 pi is 6.283";
+  EXPECT_EQ(events(-6.2, 6.2).size(), 0u);
 }
 
 TEST(Run, ARoleWithAnotherUnitThanItsBlockIsAnEvent) {

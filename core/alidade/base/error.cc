@@ -20,6 +20,12 @@ bool HasLetters(std::string_view whole, std::string_view part) {
   return found == part.size();
 }
 
+/// Returns true if `candidate` is `word` with a unit, such as `wz [deg/s]` for `wz`.
+bool HasUnitAfter(std::string_view candidate, std::string_view word) {
+  return !word.empty() && candidate.size() > word.size() && candidate.starts_with(word) &&
+         std::string_view(" [(").find(candidate[word.size()]) != std::string_view::npos;
+}
+
 /// Returns true if `part` abbreviates `whole`: its letters occur in `whole` in the same order, from
 /// the start of one of the words that `_` and `.` separate.
 bool Abbreviates(std::string_view part, std::string_view whole) {
@@ -79,6 +85,7 @@ Failure CaughtFailure() {
 int SpellingCost(std::string_view word, std::string_view candidate) {
   constexpr int kAbbreviationCost = 1000;  // above the distance of any typing error
   const std::string a = internal::LowerCase(word), b = internal::LowerCase(candidate);
+  if (HasUnitAfter(b, a)) return 0;
   const int distance = EditDistance(a, b);
   if (distance < static_cast<int>(a.size()) / 3 + 2) return distance;
   return Abbreviates(a, b) || Abbreviates(b, a) ? kAbbreviationCost + distance : kNotSimilar;

@@ -36,6 +36,13 @@ TEST_F(Tables, ATableWithoutColumnsOfTheConfigHasASeparator) {
                   "east; did you mean 't'?");
 }
 
+TEST_F(Tables, SuggestsTheColumnWithAUnit) {
+  Write("t_s,wx,wy,wz [deg/s]\n0,1,2,3\n");
+  ExpectBadConfig("path: a.csv\nstreams: {gyro: wz}\n",
+                  "run.yaml:2:17 streams.gyro: there is no column 'wz' in FILE; expected one of "
+                  "t_s, wx, wy, wz [deg/s]; did you mean 'wz [deg/s]'?");
+}
+
 TEST_F(Tables, AGivenSeparatorIsUsed) {
   Write("a;b,z\n1;2,3\n");
   EXPECT_EQ(Shown(Frames("path: a.csv\nseparator: ','\nrate_hz: 1\nstreams: {z: z}\n")),

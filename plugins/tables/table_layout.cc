@@ -235,6 +235,8 @@ Timestamp ReadTime(const Node& entry, TableTime& time) {
   }
   time.column = TableColumn{"t_s", node.value_or(entry)};
   if (!node) return 0;
+  const bool is_text = node->kind() == Node::Kind::kScalar;
+  node->ExpectMap("{column: " + (is_text ? node->Text() : "t_s") + '}');
   if (const auto column = node->Find("column")) time.column = ReadColumn(*column);
   if (const auto unit = node->Find("unit")) {
     const int thousands = unit->Choice({"s", "ms", "us", "ns"});
@@ -310,6 +312,12 @@ void Resolve(const std::vector<std::string>& names, const std::string& file, Tab
                          ", because its first line contains numbers, not names",
                      "a first line that names the columns, as in 't_s,depth', or 'columns: [t_s, "
                      "depth]' in the config");
+  }
+  double number = 0.0;
+  if (found == names.end() && cell::ParseNumber(column.name, number) == nullptr) {
+    column.node.Fail("'" + column.name + "' is a number, not a column of " + file,
+                     "the name of a column; a constant noise belongs to the sensor, as in "
+                     "'sigma_m: 0.1'");
   }
   if (found == names.end()) {
     std::string expected = "one of ";

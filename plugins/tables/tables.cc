@@ -55,7 +55,15 @@ class TablesSource : public Source {
       return;
     }
     std::filesystem::path folder = arguments.folder;
-    if (const auto path = arguments.entry.Find("path")) folder = ReadPath(*path, folder);
+    if (const auto path = arguments.entry.Find("path")) {
+      folder = ReadPath(*path, folder);
+      if (!std::filesystem::is_directory(folder)) {
+        throw Error(
+            ExitCode::kInputMissing,
+            ErrorLine(path->place(), path->path(), "there is no folder '" + folder.string() + "'",
+                      "the folder of the files", internal::NearFile(folder)));
+      }
+    }
     for (const Node& file : files->Items()) {
       file.ExpectMap("{path: gps.csv, streams: {gps: [x, y]}}");
       AddTable(file, folder);

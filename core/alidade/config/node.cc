@@ -80,7 +80,9 @@ std::vector<std::pair<std::string, Node>> Node::Entries() const {
 
 std::vector<Node> Node::Items() const {
   std::vector<Node> items;
-  for (const auto& child : Expect(*tree_, Kind::kList, "a list").children) {
+  const bool is_scalar = kind() == Kind::kScalar;
+  const std::string expected = "a list" + (is_scalar ? ", as in [" + tree_->text + ']' : "");
+  for (const auto& child : Expect(*tree_, Kind::kList, expected.c_str()).children) {
     items.emplace_back(child.get());
   }
   return items;

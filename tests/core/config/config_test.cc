@@ -413,6 +413,8 @@ TEST(Node, WrongKindSaysWhatIsThere) {
   EXPECT_EQ(Message([&] { root.At("a").Find("x"); }), "f.yaml:1:4 a: 'text'; expected a map");
   EXPECT_EQ(Message([&] { root.At("b").Text(); }), "f.yaml:2:4 b: a list; expected text");
   EXPECT_EQ(Message([&] { root.At("c").Items(); }), "f.yaml:3:1 c: no value; expected a list");
+  EXPECT_EQ(Message([&] { root.At("a").Items(); }),
+            "f.yaml:1:4 a: 'text'; expected a list, as in [text]");
 }
 
 TEST(Node, LongAndBinaryTextIsShownShort) {

@@ -43,6 +43,27 @@ TEST_F(Tables, SuggestsTheColumnWithAUnit) {
                   "t_s, wx, wy, wz [deg/s]; did you mean 'wz [deg/s]'?");
 }
 
+TEST_F(Tables, ANumberIsNoColumn) {
+  Write("t_s,x\n0,1\n");
+  ExpectBadConfig("path: a.csv\nstreams: {z: {columns: x, sigma: 0.03}}\n",
+                  "run.yaml:2:34 streams.z.sigma: '0.03' is a number, not a column of FILE; "
+                  "expected the name of a column; a constant noise belongs to the sensor, as in "
+                  "'sigma_m: 0.1'");
+}
+
+TEST_F(Tables, ShowsTheMapOfATime) {
+  Write("stamp,x\n0,1\n");
+  ExpectBadConfig("path: a.csv\ntime: stamp\nstreams: {z: x}\n",
+                  "run.yaml:2:7 time: 'stamp'; expected a map, as in {column: stamp}");
+}
+
+TEST_F(Tables, NamesAFolderThatDoesNotExist) {
+  ExpectError(ExitCode::kInputMissing,
+              "run.yaml:1:7 path: there is no folder '" + (folder_ / "lgo").string() +
+                  "'; expected the folder of the files",
+              [&] { Frames("path: lgo\nfiles: [{path: a.csv, streams: {x: x}}]\n"); });
+}
+
 TEST_F(Tables, AGivenSeparatorIsUsed) {
   Write("a;b,z\n1;2,3\n");
   EXPECT_EQ(Shown(Frames("path: a.csv\nseparator: ','\nrate_hz: 1\nstreams: {z: z}\n")),

@@ -14,7 +14,7 @@ void Emplace(const std::string& letters, Params& p, AlidadeInstance* instance) {
   std::array<int, M> axes{};
   for (std::size_t i = 0; i < axes.size(); ++i) axes[i] = letters[i] - 'x';
   using Model = BodyVelocity<D, M>;
-  detail::PublishSensor(std::make_unique<detail::Holder<Model>>(Model(axes, p)), instance);
+  EmplaceSensor(Model(axes, p), instance);
 }
 
 /// Returns true if the letters are distinct axes of D dimensions in their order.

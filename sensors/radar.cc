@@ -22,7 +22,7 @@ void Emplace(const Sigmas& sigmas, AlidadeInstance* instance) {
   for (const auto& value : {sigmas.range, sigmas.azimuth, sigmas.elevation, sigmas.rate}) {
     if (value && i < sigma.size()) sigma[i++] = *value;
   }
-  detail::PublishSensor(std::make_unique<detail::Holder<Model>>(Model(sigma)), instance);
+  EmplaceSensor(Model(sigma), instance);
 }
 
 template <int D>

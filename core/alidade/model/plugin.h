@@ -115,6 +115,11 @@ constexpr AlidadeEntry Entry(std::uint32_t kind, const char* name, const char* d
 
 }  // namespace detail
 
+/// Stores a sensor model in `instance`.
+template <class Model>
+void EmplaceSensor(const Model& model, AlidadeInstance* instance) {
+  detail::PublishSensor(std::make_unique<detail::Holder<Model>>(model), instance);
+}
 /// Creates a model from its parameters and stores it in `instance`.
 template <class Model>
 void EmplaceSensor(Params& params, AlidadeInstance* instance) {

@@ -365,6 +365,11 @@ class OwnedStateReader {
                      "' is constant, so it cannot have dynamics; "
                      "add an initial sigma, or remove this key");
     }
+    const bool is_exact =
+        state.initial.covariance.isZero(0.0) &&
+        std::ranges::all_of(state.initial.sigma, [](double s) { return s == 0.0; });
+    const bool is_varied = is_considered || state.process.dynamics != OwnedDynamics::kConstant;
+    if (is_exact && !is_varied) state.initial.status = BlockStatus::kConstant;
     return state;
   }
 

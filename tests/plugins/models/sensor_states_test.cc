@@ -118,6 +118,20 @@ TEST(SensorStates, TheConfigHasTheLastWord) {
   ExpectSameReceiver(constant, known, 1e-12);
 }
 
+TEST(SensorStates, AreConstantIfTheirInitialValueIsExact) {
+  const auto status = [](const std::string& keys) {
+    const Config config = testing::Read(Filled("", "", keys));
+    const Experiment experiment = BuildExperiment(config, TheHost());
+    const StateLayout& layout = experiment.estimators[0].problem.layout;
+    return layout[layout.Find("gnss.clock_bias")].status;
+  };
+  const std::string exact = ", initial: {clock_bias: {mean: 3, sigma: 0}}";
+  EXPECT_EQ(status(exact + ", dynamics: {clock_bias: constant}"), BlockStatus::kConstant);
+  EXPECT_EQ(status(exact + ", dynamics: {clock_bias: {random_walk: 1}}"), BlockStatus::kEstimated);
+  EXPECT_EQ(status(exact + ", dynamics: {clock_bias: constant}, consider: [clock_bias]"),
+            BlockStatus::kConsider);
+}
+
 TEST(SensorStates, CanBeConsidered) {
   std::string owned = Filled("", "",
                              ", consider: [clock_bias], initial: {clock_bias: {mean: 0, "

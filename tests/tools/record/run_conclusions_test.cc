@@ -83,6 +83,32 @@ TEST(RunConclusions, NameALoopClosure) {
                   "error from 500 mm to 20 mm. (a loop closure or a first fix)"});
 }
 
+TEST(RunConclusions, NameTheLastEstimatesOfSensorStates) {
+  Problem problem;
+  const Space bias{"bias", "rad/s", "", {}, Geometry::Vector(1)};
+  const BlockId block = problem.layout.Declare("gyro.bias", "gyro", bias, BlockStatus::kEstimated);
+  std::vector<EstimateHistory> history;
+  history.emplace_back(BlockLayoutsOf(problem, {}));
+  for (const double value : {0.0, 0.012345}) {
+    State state(problem.layout);
+    state.Add(block, &value, Eigen::Matrix<double, 1, 1>(1e-6));
+    history[0].Add({testing::FrameAt(1, {}), {}}, state);
+  }
+  EstimatorResult estimator = ResultOf("ekf", {});
+  EXPECT_TRUE(ConclusionsOf(RunOf({estimator}), history).empty()) << "no sensor owns the block";
+  estimator.sensors = {"gyro"};
+  EXPECT_EQ(ConclusionLines(ConclusionsOf(RunOf({estimator}), history)),
+            (Lines{"ekf ends with gyro.bias 0.01235 +- 0.001 rad/s. (1 sigma; without truth)"}));
+}
+
+TEST(RunConclusions, NameTimesSince1970) {
+  CameraHistory camera;
+  for (int k = 0; k < 40; ++k) camera.Add(1'700'000'000 + k, 0.0, k < 20 ? 1.0 : 0.1);
+  const Lines lines = ConclusionLines(ConclusionsOf(RunOf({ResultOf("ekf", {})}), camera.history));
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_TRUE(lines[0].starts_with("ekf: at t = 1700000020 s the sigma")) << lines[0];
+}
+
 TEST(RunConclusions, RankTheErrorsAndNameThoseOfSegments) {
   const RunResult result =
       RunOf({ResultOf("ekf", {{"rmse:cam.position", 0.020}}),

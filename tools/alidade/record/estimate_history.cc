@@ -26,7 +26,8 @@ double Length(const std::vector<double>& vector) {
 
 }  // namespace
 
-EstimateHistory::EstimateHistory(const std::vector<BlockLayout>& blocks) : blocks_(blocks) {
+EstimateHistory::EstimateHistory(const std::vector<BlockLayout>& blocks)
+    : blocks_(blocks), last_(blocks.size()) {
   for (const BlockLayout& block : blocks_) {
     std::vector<ElementHistory>& elements = elements_.emplace_back();
     for (const std::string& name : TangentNames(block.name, block.space)) {
@@ -56,7 +57,10 @@ void EstimateHistory::Add(const SourceFrame& frame, const State& state) {
   constexpr double kBound = 3.0;  // sigmas
   const BlockRow row{frame, state};
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    if (blocks_[b].truth < 0) continue;
+    if (blocks_[b].truth < 0) {
+      last_[b] = {row.ValuesOf(blocks_[b]), row.SigmasOf(blocks_[b])};
+      continue;
+    }
     const std::vector<double> error = row.ErrorOf(blocks_[b]), sigma = row.SigmasOf(blocks_[b]);
     for (std::size_t i = 0; i < std::min(error.size(), sigma.size()); ++i) {
       const bool is_outside = sigma[i] > 0.0 && std::abs(error[i]) > kBound * sigma[i];
@@ -65,6 +69,19 @@ void EstimateHistory::Add(const SourceFrame& frame, const State& state) {
   }
   if (position_) AddPosition(row, frame.timestamp);
   ++rows_;
+}
+
+std::vector<FinalValue> EstimateHistory::FinalValues() const {
+  std::vector<FinalValue> final_values;
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const auto& [values, sigmas] = last_[b];
+    if (values.size() != sigmas.size()) continue;  // elements of the tangent space have no value
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      final_values.push_back({elements_[b][i].excursion.element, blocks_[b].owner(),
+                              blocks_[b].unit, values[i], sigmas[i]});
+    }
+  }
+  return final_values;
 }
 
 void EstimateHistory::AddPosition(const BlockRow& row, Timestamp timestamp) {

@@ -28,6 +28,12 @@ struct SigmaFall {
   double ratio() const { return sigma_after / sigma_before; }
 };
 
+/// Last estimate of an element without truth, with its standard deviation.
+struct FinalValue {
+  std::string element, owner, unit;
+  double value = 0.0, sigma = 0.0;
+};
+
 /// Facts about the estimates of one estimator over time that its metrics do not contain.
 class EstimateHistory {
  public:
@@ -41,6 +47,8 @@ class EstimateHistory {
   double path() const { return path_; }
   /// Returns the excursion with the longest run of timestamps; nullopt if no error was outside.
   std::optional<Excursion> LongestExcursion() const;
+  /// Returns the last estimates of the elements without truth.
+  std::vector<FinalValue> FinalValues() const;
   /// Returns the largest decrease of the sigma of the position to less than a half, without the
   /// first tenth of the estimates.
   std::optional<SigmaFall> LargestFall() const;
@@ -65,6 +73,11 @@ class EstimateHistory {
   SigmaFall next_fall_;  ///< sigma and error before the next estimate
   /// Decreases to less than a half that no later decrease exceeds.
   std::vector<SigmaFall> falls_;
+  /// Last estimate of a block.
+  struct Estimate {
+    std::vector<double> values, sigmas;
+  };
+  std::vector<Estimate> last_;  ///< of each block; empty if the block has truth
 };
 
 }  // namespace alidade::internal

@@ -16,7 +16,7 @@ namespace {
 using Tone = Conclusion::Tone;
 
 std::string TimeText(Timestamp timestamp) {
-  return "t = " + RoundedText(Seconds(timestamp), 7) + " s";
+  return "t = " + NumberText(std::round(1e3 * Seconds(timestamp)) / 1e3) + " s";
 }
 
 /// Formats a length in m or mm.
@@ -56,6 +56,23 @@ std::optional<Conclusion> FallConclusion(const EstimatorResult& result,
             LengthText(fall->error_after);
   }
   return Conclusion{Tone::kNeutral, text + '.', "a loop closure or a first fix"};
+}
+
+/// Returns a sentence about the last estimates of the states of sensors, such as biases, whose true
+/// values are unknown.
+std::optional<Conclusion> SensorStates(const EstimatorResult& result,
+                                       const EstimateHistory& history) {
+  std::vector<std::string> parts;
+  for (const FinalValue& final : history.FinalValues()) {
+    const bool is_of_sensor =
+        std::ranges::find(result.sensors, final.owner) != result.sensors.end();
+    if (!is_of_sensor || !(final.sigma > 0.0)) continue;
+    parts.push_back(final.element + ' ' + RoundedText(final.value, 4) + " +- " +
+                    RoundedText(final.sigma, 2) + (final.unit.empty() ? "" : ' ' + final.unit));
+  }
+  if (parts.empty()) return std::nullopt;
+  return Conclusion{Tone::kNeutral, result.name + " ends with " + Join(parts) + '.',
+                    "1 sigma; without truth"};
 }
 
 /// Returns the key of the error that ranks the estimators, or "".
@@ -196,6 +213,7 @@ std::vector<Conclusion> ConclusionsOf(const RunResult& result,
   for (std::size_t e = 0; e < std::min(histories.size(), result.estimators.size()); ++e) {
     append(ExcursionConclusion(result.estimators[e], histories[e]));
     append(FallConclusion(result.estimators[e], histories[e]));
+    append(SensorStates(result.estimators[e], histories[e]));
   }
   const std::string key = MainErrorOf(result);
   const std::vector<const EstimatorResult*> ranked = Ranked(result, key);

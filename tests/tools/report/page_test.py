@@ -619,6 +619,20 @@ class Use(PageCase):
         self.assertGreaterEqual(len(colours), 5)
         self.assertIn("depth [mm]", texts)
 
+    def test_errors_are_drawn_although_few_frames_have_truth(self):
+        rows = [f"{k / 25},{86.6 + 0.5 * (-1) ** k}" for k in range(500)]
+        (self.root / "data.csv").write_text("\n".join(["t_s,disparity_px", *rows]))
+        truths = [f"{k / 5},0.3" for k in range(100)]
+        (self.root / "truth.csv").write_text("\n".join(["t_s,depth", *truths]))
+        source = "{type: tables, files: [{path: data.csv, streams: {disparity: disparity_px}}, " \
+                 "{path: truth.csv, truth: {depth: depth}}]}"
+        old = BROKEN[BROKEN.index("source: ") + 8:BROKEN.index("estimators")]
+        (self.root / "sparse.yaml").write_text(BROKEN.replace(old, source + "\n"))
+        self.open("sparse", "run", self.root / "sparse.yaml")
+        root = xml.parse(self.save("NEES over time", "SVG")).getroot()
+        paths = [path.get("d") for path in root.iter("{http://www.w3.org/2000/svg}path")]
+        self.assertGreater(max(d.split("M")[-1].count("L") for d in paths), 50)
+
     def test_a_saved_png_is_a_picture(self):
         self.open_depth()
         content = self.save("target · depth", "PNG").read_bytes()

@@ -3,13 +3,6 @@
 
 const gainSensors = () => unique(RUN.estimators.flatMap((e) => e.gains.map((g) => g.sensor)));
 
-/** The median step between sorted times. */
-const medianStep = (times) =>
-  quantiles(
-    Array.from(times.slice(1, 2000), (t, i) => t - times[i]),
-    [0.5],
-  )[0];
-
 /** The gains of a sensor: a plot for each element of K. */
 function gainFigure(sensor) {
   const users = RUN.estimators

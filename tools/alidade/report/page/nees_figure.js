@@ -11,8 +11,8 @@ function neesFigure(box) {
       RUN.estimators.map((e) => {
         const nees = e.nees.find((q) => q.owner === owner);
         if (!nees || isZero(nees.v)) return null;
-        const y = columnOf(nees.v);
-        return {kind: 'line', x: columnOf(e.t), y, est: e.name, name: e.name, width: 1.3};
+        const points = knownPart(columnOf(e.t), columnOf(nees.v));
+        return {kind: 'line', ...points, est: e.name, name: e.name, width: 1.3};
       });
     const label = `NEES of ${owner}, ${plural(dof, 'degree')} of freedom`;
     const one = {kind: 'h', v: 1, color: () => colours.muted, dash: [2, 3]};

@@ -12,7 +12,7 @@ const overTimeLines = (x, name) =>
   COMPARISON.estimators
     .map((e) => ({e, y: overTimeColumn(e, name)}))
     .filter(({y}) => y)
-    .map(({e, y}) => ({kind: 'line', x, y, est: e.name, name: e.name}));
+    .map(({e, y}) => ({kind: 'line', ...knownPart(x, y), est: e.name, name: e.name}));
 
 function errorOverTime(block, x) {
   const bands = COMPARISON.estimators
@@ -24,7 +24,7 @@ function errorOverTime(block, x) {
     });
   const bounds = COMPARISON.estimators.map((e) => overTimeColumn(e, 'bound:' + block));
   const y = bounds.find(Boolean);
-  const bound = y && {kind: 'line', x, y, color: ink, dash: [6, 4], name: 'Cramér-Rao bound'};
+  const bound = y && {kind: 'line', ...knownPart(x, y), color: ink, dash: [6, 4], name: 'Cramér-Rao bound'};
   return new Plot({
     label: `RMS error of ${block}`,
     time: true,

@@ -78,7 +78,7 @@ function valueLayers(users, k) {
   });
   const {truth} = users[0].elements.values[k];
   const style = {ref: true, color: ink, dash: [6, 4], width: 1.4, name: 'truth'};
-  const trueLine = truth && {kind: 'line', x: columnOf(RUN.t), y: truth, ...style};
+  const trueLine = truth && {kind: 'line', ...knownPart(columnOf(RUN.t), truth), ...style};
   return [...bands, ...implied, ...lines, trueLine];
 }
 
@@ -90,7 +90,7 @@ function errorLayers(users, k) {
       const {y, sigma} = elements.errors[k];
       const x = columnOf(e.t);
       const band = {kind: 'band', x, s: sigma, m: 3, est: e.name, fill: 0.05, edge: true};
-      return [sigma && band, {kind: 'line', x, y, s: sigma, est: e.name, name: e.name}];
+      return [sigma && band, {kind: 'line', ...knownPart(x, y, sigma), est: e.name, name: e.name}];
     });
 }
 

@@ -49,7 +49,7 @@ function similarEstimators() {
 function estimatorItem(group, add) {
   const [e] = group;
   const {state, because, since, cls, mark} = verdictOf(e);
-  const notes = [...findingTexts(e), ...eventTexts(e)];
+  const notes = [...findingTexts(e, because), ...eventTexts(e)];
   const names = namesOf(group.map((member) => member.name));
   if (isConsistent(e)) {
     if (notes.length) add('calm', '·', [names, ': ', notes.shift()], notes);
@@ -61,7 +61,11 @@ function estimatorItem(group, add) {
   add(cls, mark, [names, verb, state, time, ': ', sentence(because)], notes);
 }
 
-const findingTexts = (e) => (e.diagnosis || []).map((finding) => sentence(finding.text) + ' ');
+/** The findings, except that of the verdict. */
+const findingTexts = (e, because) =>
+  (e.diagnosis || [])
+    .filter((finding) => finding.text !== because)
+    .map((finding) => sentence(finding.text) + ' ');
 
 /** Kinds of events whose content a verdict reports. */
 const VERDICT_KINDS = /^(diverged|lost|mostly_rejected)$/;

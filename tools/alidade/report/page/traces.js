@@ -137,3 +137,22 @@ function steps(L, X, Y) {
     );
   return p;
 }
+
+/** The median step between sorted times. */
+const medianStep = (times) =>
+  quantiles(
+    Array.from(times.slice(1, 2000), (t, i) => t - times[i]),
+    [0.5],
+  )[0];
+
+/**
+ * The part of a line with values: true values can be rarer than frames. {x, y, s, gap}: the line
+ * connects the values, except over a gap.
+ */
+function knownPart(x, y, s) {
+  const rows = Array.from(y.keys()).filter((i) => y[i] === y[i]);
+  if (rows.length === y.length) return {x, y, s};
+  const pick = (values) => values && Float64Array.from(rows, (i) => values[i]);
+  const times = pick(x);
+  return {x: times, y: pick(y), s: pick(s), gap: 6 * medianStep(times)};
+}

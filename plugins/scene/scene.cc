@@ -130,7 +130,7 @@ class Scene : public Source {
   void DefineStreams(const std::string& state) {
     constexpr int kSizes[] = {2, 4, 3};
     streams_ = {{"tracks", kSizes[measures_]}};
-    if (remaining_known_ > 0) streams_.push_back({"known", 3});
+    if (remaining_known_ > 0) streams_.push_back({.name = "known", .size = 3, .covariance = 3});
     if (odometry_stream_ >= 0) {
       odometry_stream_ = static_cast<int>(streams_.size());
       streams_.push_back({"odometry", 6});

@@ -177,6 +177,7 @@ void ReadStreamKeys(const Node& node, TableField& field) {
   ReadCovariance(node, field);
   const auto& columns = field.known_table ? field.known_table->columns : field.known;
   field.info.known = static_cast<int>(columns.size());
+  if (field.covariance) field.info.covariance = static_cast<int>(field.covariance->size);
 }
 
 void ReadFieldMap(const std::string& name, const Node& node, bool is_stream, TableField& field) {

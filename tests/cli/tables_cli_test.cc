@@ -64,6 +64,41 @@ TEST_F(TablesCli, ReadsLandmarksWithTheirIds) {
   EXPECT_TRUE(direct.starts_with(measured));
 }
 
+// Ranges in the plane to known points, with the variance of each range, and positions with a full
+// covariance.
+TEST_F(TablesCli, ReadsKnownNumbersAndCovariances) {
+  std::string rows = "t_s,r,x,y,s,px,py,pxx,pxy,pyy\n";
+  for (int k = 0; k < 20; ++k) {
+    const std::string noise = std::to_string(0.1 + 0.01 * k);
+    rows += std::to_string(0.1 * k) + ',' + std::to_string(5.0 + 0.1 * k) + ",3,4," + noise +
+            ",0.1,0.2," + noise + ",0.02," + noise + '\n';
+  }
+  Write("log.csv", rows);
+  Write("robot.yaml",
+        "alidade: 1\n"
+        "state: {robot: {model: constant_velocity, dimensions: 2, noise: {acceleration: 1}, "
+        "initial: {position: {sigma: 1}, velocity: {sigma: 1}}}}\n"
+        "sensors:\n"
+        "  beacon: {model: range, stream: range, roles: robot, sigma_m: 9}\n"
+        "  gps: {model: position, stream: gps, roles: robot, sigma_m: 9}\n"
+        "source: {type: tables, path: log.csv, streams: {range: {columns: r, known: [x, y], sigma: "
+        "s}, gps: {columns: [px, py], covariance: [pxx, pxy, pyy]}}}\n"
+        "estimators: [ekf]\n");
+  const std::string direct = Estimates("robot.yaml", "direct");
+  EXPECT_EQ(Estimates("robot.yaml", "measured",
+                      "{type: tables, path: direct/measurements.csv, time: {repeats: true}, "
+                      "streams: {range: {columns: v0, rows: {stream: range}, known: [known0, "
+                      "known1], variance: R0}, gps: {columns: [v0, v1], rows: {stream: gps}, "
+                      "covariance: [R0, R1, R2, R3]}}}"),
+            direct);
+  ASSERT_EQ(Call({"simulate", "robot.yaml", "-o", "data"}).code, 0);
+  EXPECT_EQ(Estimates("robot.yaml", "simulated",
+                      "{type: tables, path: data, files: [{path: range.csv, streams: {range: "
+                      "{columns: range, known: [known0, known1], variance: R0}}}, {path: gps.csv, "
+                      "streams: {gps: {columns: [gps.0, gps.1], covariance: [R0, R1, R2, R3]}}}]}"),
+            direct);
+}
+
 TEST_F(TablesCli, OutputsDoNotReplaceTheFilesOfTheSource) {
   Write("log.csv", "t_s,d\n0,80\n");
   const std::string before = Read("log.csv");

@@ -15,7 +15,8 @@ struct StreamInfo {
   int size = 1;
   /// Standard deviation of each tangent element of a true value. Not used for measurements.
   double sigma = 0.0;
-  int known = 0;  ///< number of known numbers of each measurement
+  int known = 0;       ///< number of known numbers of each measurement
+  int covariance = 0;  ///< number of rows of the covariance of each measurement; 0: none
 };
 
 /// One value of one stream.

@@ -85,8 +85,9 @@ class ImageTarget : public Source {
       intrinsics = rectification_->intrinsics();
     }
     tracker_.emplace(options_, intrinsics);
-    if (right_) streams_.push_back({"disparity", 1});
-    streams_.push_back({"inverse_scale", 1});
+    const int covariance = estimate_noise_ ? 1 : 0;
+    if (right_) streams_.push_back({.name = "disparity", .covariance = covariance});
+    streams_.push_back({.name = "inverse_scale", .covariance = covariance});
     if (truth_) {
       for (const std::string& name : truth_->names()) truths_.push_back({name, 1});
     }

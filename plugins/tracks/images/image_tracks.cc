@@ -58,6 +58,7 @@ class ImageTracks : public Source {
     if (const auto known = arguments.entry.Find("known")) {
       ReadKnown(arguments.folder / known->Text(), *known);
     }
+    if (estimate_noise_) streams_[0].covariance = 2;
     guide_name_ = text("guide", "none");
     if (guide_name_ == "none") guide_name_.clear();
     const std::string state = text("state_entry", "cam");

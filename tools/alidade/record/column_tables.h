@@ -36,43 +36,50 @@ inline void WriteFinite(double value, CsvFile& file) {
 // Columns of measurements.csv.
 
 struct MeasurementLayout {
-  std::size_t width, known_width;  ///< numbers of columns `v` and `known` for the widest stream
+  /// Numbers of columns `v`, `known` and `R` for the widest stream.
+  std::size_t width, known_width, covariance_width;
 };
 struct MeasurementRow {
   const Measurement& measurement;
   const std::string& stream;
 };
-inline constexpr std::array kMeasurementColumns =
-    std::to_array<ColumnInfo<MeasurementLayout, MeasurementRow>>({
-        {"t_s", "s", "timestamp of the measurement",
-         [](const auto&, const MeasurementRow& row, CsvFile& file) {
-           file.Time(row.measurement.timestamp);
-         }},
-        {"stream", "", "stream of the source",
-         [](const auto&, const MeasurementRow& row, CsvFile& file) { file.Text(row.stream); }},
-        {"landmark", "", "id of the landmark; empty if the measurement has no id",
-         [](const auto&, const MeasurementRow& row, CsvFile& file) {
-           file.Landmark(row.measurement.landmark);
-         }},
-        {"v", "unit of the stream",
-         "values of the measurement; the widest stream determines the number of columns",
-         [](const MeasurementLayout& layout, const MeasurementRow& row, CsvFile& file) {
-           file.Numbers(row.measurement.values.data(), row.measurement.values.size(), layout.width);
-         },
-         [](const MeasurementLayout& layout) { return NumberedColumns("v", layout.width); },
-         "`v0`, `v1`, ..."},
-        {"known", "unit of the stream",
-         "numbers that accompany the measurement and are not estimated, such as the position of a "
-         "satellite; the columns exist only if a stream has such numbers",
-         [](const MeasurementLayout& layout, const MeasurementRow& row, CsvFile& file) {
-           file.Numbers(row.measurement.known.data(), row.measurement.known.size(),
-                        layout.known_width);
-         },
-         [](const MeasurementLayout& layout) {
-           return NumberedColumns("known", layout.known_width);
-         },
-         "`known0`, `known1`, ..."},
-    });
+inline constexpr std::array kMeasurementColumns = std::to_array<
+    ColumnInfo<MeasurementLayout, MeasurementRow>>({
+    {"t_s", "s", "timestamp of the measurement",
+     [](const auto&, const MeasurementRow& row, CsvFile& file) {
+       file.Time(row.measurement.timestamp);
+     }},
+    {"stream", "", "stream of the source",
+     [](const auto&, const MeasurementRow& row, CsvFile& file) { file.Text(row.stream); }},
+    {"landmark", "", "id of the landmark; empty if the measurement has no id",
+     [](const auto&, const MeasurementRow& row, CsvFile& file) {
+       file.Landmark(row.measurement.landmark);
+     }},
+    {"v", "unit of the stream",
+     "values of the measurement; the widest stream determines the number of columns",
+     [](const MeasurementLayout& layout, const MeasurementRow& row, CsvFile& file) {
+       file.Numbers(row.measurement.values.data(), row.measurement.values.size(), layout.width);
+     },
+     [](const MeasurementLayout& layout) { return NumberedColumns("v", layout.width); },
+     "`v0`, `v1`, ..."},
+    {"known", "unit of the stream",
+     "numbers that accompany the measurement and are not estimated, such as the position of a "
+     "satellite; the columns exist only if a stream has such numbers",
+     [](const MeasurementLayout& layout, const MeasurementRow& row, CsvFile& file) {
+       file.Numbers(row.measurement.known.data(), row.measurement.known.size(), layout.known_width);
+     },
+     [](const MeasurementLayout& layout) { return NumberedColumns("known", layout.known_width); },
+     "`known0`, `known1`, ..."},
+    {"R", "product of the units of the stream",
+     "covariance of the measurement, row by row; empty if the measurement has none; the columns "
+     "exist only if a stream has covariances",
+     [](const MeasurementLayout& layout, const MeasurementRow& row, CsvFile& file) {
+       file.Numbers(row.measurement.covariance.data(), row.measurement.covariance.size(),
+                    layout.covariance_width);
+     },
+     [](const MeasurementLayout& layout) { return NumberedColumns("R", layout.covariance_width); },
+     "`R0`, `R1`, ..."},
+});
 
 // Columns of truth.csv.
 

@@ -98,6 +98,7 @@ class DataFiles {
     const auto index = static_cast<std::size_t>(measurement.stream);
     const StreamInfo& stream = source_.streams()[index];
     const bool is_landmark = measurement.landmark >= 0;
+    const auto covariance_width = static_cast<std::size_t>(stream.covariance * stream.covariance);
     const bool has_track_rows = is_landmark && (stream.name == "tracks" || stream.name == "known");
     std::optional<CsvFile>& file = streams_[index];
     if (!file) {
@@ -107,6 +108,8 @@ class DataFiles {
         if (is_landmark) header.emplace_back("landmark");
         for (const std::string& name : ColumnsOf(stream)) header.push_back(name);
         for (int i = 0; i < stream.known; ++i) header.push_back("known" + std::to_string(i));
+        for (std::size_t i = 0; i < covariance_width; ++i)
+          header.push_back("R" + std::to_string(i));
       }
       OpenCsv(file, stream.name + ".csv", header);
     }
@@ -117,6 +120,7 @@ class DataFiles {
       file->Numbers(measurement.values.data(), measurement.values.size(),
                     measurement.values.size());
       file->Numbers(measurement.known.data(), measurement.known.size(), measurement.known.size());
+      file->Numbers(measurement.covariance.data(), measurement.covariance.size(), covariance_width);
       return file->EndRow();
     }
     for (std::size_t dim = 0; dim < measurement.values.size(); ++dim) {

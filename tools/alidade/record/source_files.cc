@@ -41,6 +41,8 @@ SourceFiles::SourceFiles(const OutputFolder& folder, const Experiment& experimen
   for (const StreamInfo& stream : streams_) {
     layout_.width = std::max(layout_.width, static_cast<std::size_t>(stream.size));
     layout_.known_width = std::max(layout_.known_width, static_cast<std::size_t>(stream.known));
+    const auto rows = static_cast<std::size_t>(stream.covariance);
+    layout_.covariance_width = std::max(layout_.covariance_width, rows * rows);
   }
   const auto create = [&](const char* name, const auto& table, const auto& layout) {
     std::vector<Column> columns;

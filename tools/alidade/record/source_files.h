@@ -55,7 +55,7 @@ class SourceFiles {
   TruthLayout truth_layout_;
   std::map<int, Expectation> expectations_;  ///< key: index of the stream
   std::vector<Inverse> inverses_;
-  MeasurementLayout layout_{1, 0};
+  MeasurementLayout layout_{1, 0, 0};
   ImpliedLayout implied_layout_;
   std::optional<CsvFile> measurements_, truth_, expected_, implied_;
   std::optional<PoseFile> poses_;

@@ -39,11 +39,11 @@ struct Attitude : Motion<6, UnitQuaternion, Vec<3>> {
   explicit Attitude(const std::array<double, 3>& gyro, double gyro_bias = 0.0)
       : noise{NoiseKind::kContinuous, gyro}, bias_walk(gyro_bias) {}
   explicit Attitude(Params& p)
-      : Attitude(
+      : Attitude{
             p.PerAxis<3>("noise.gyro", "rad/s^0.5",
                          "root of the spectral density of the gyroscope's noise", kNonNegative),
             p.NonNegative("noise.gyro_bias", "rad/s^1.5",
-                          "standard deviation of the change of the bias in one second", 0.0)) {}
+                          "standard deviation of the change of the bias in one second", 0.0)} {}
 
   template <class T>
   void Step(const T* q, const T* b, const T* u, const T* w, double dt_s, T* q1, T* b1) const {

@@ -43,13 +43,13 @@ struct Bicycle : Motion<2, Vec<2>, Angle> {
       : noise{kind, {sigma_speed, sigma_steering_angle}}, wheelbase_m(wheelbase) {}
   explicit Bicycle(Params& p) : Bicycle(p, InputNoise<2>::ReadKind(p)) {}
   Bicycle(Params& p, NoiseKind kind)
-      : Bicycle(kind,
+      : Bicycle{kind,
                 p.NonNegative("noise.speed", kind == NoiseKind::kDiscrete ? "m/s" : "m/s^0.5",
                               "noise of the speed"),
                 p.NonNegative("noise.steering_angle",
                               kind == NoiseKind::kDiscrete ? "rad" : "rad s^0.5",
                               "noise of the steering angle"),
-                p.Positive("wheelbase_m", "m", "distance between the axles")) {}
+                p.Positive("wheelbase_m", "m", "distance between the axles")} {}
 
   NoiseKind noise_kind() const { return noise.kind; }
   template <class T>

@@ -44,10 +44,10 @@ struct Clock : Motion<2, Vec<1>, Vec<1>> {
       : Clock(
             p.Choice("noise_model", {"densities", "power_law"},
                      "noise given by densities, or by coefficients of the oscillator", 0) == 0
-                ? Clock(p.NonNegative("noise.bias", kInMetres ? "m/s^0.5" : "s^0.5",
+                ? Clock{p.NonNegative("noise.bias", kInMetres ? "m/s^0.5" : "s^0.5",
                                       "root of the spectral density of the noise of the bias"),
                         p.NonNegative("noise.drift", kInMetres ? "m/s^1.5" : "s^-0.5",
-                                      "root of the spectral density of the noise of the drift"))
+                                      "root of the spectral density of the noise of the drift")}
                 : FromPowerLaw(p.NonNegative("h_0", "s", "coefficient of white frequency noise"),
                                p.NonNegative("h_minus_2", "1/s",
                                              "coefficient of the random walk of the frequency"))) {}

@@ -38,10 +38,10 @@ struct CoordinatedTurn : Motion<4, Vec<2>, Angle, Vec<1>, Vec<1>> {
   CoordinatedTurn(double acceleration, double angular_acceleration)
       : sigma_v(acceleration), sigma_omega(angular_acceleration) {}
   explicit CoordinatedTurn(Params& p)
-      : CoordinatedTurn(p.NonNegative("noise.acceleration", "m/s^1.5",
+      : CoordinatedTurn{p.NonNegative("noise.acceleration", "m/s^1.5",
                                       "root of the spectral density of the acceleration"),
                         p.NonNegative("noise.angular_acceleration", "rad/s^1.5",
-                                      "root of the spectral density of the angular acceleration")) {
+                                      "root of the spectral density of the angular acceleration")} {
   }
 
   template <class T>

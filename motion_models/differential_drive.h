@@ -51,13 +51,13 @@ struct DifferentialDrive : Motion<2, Vec<2>, Angle, Vec<1>, Vec<1>, Vec<1>> {
       : noise{kind, sigma}, radius_m(wheel_radius_m), track_m(track_width_m) {}
   explicit DifferentialDrive(Params& p) : DifferentialDrive(p, InputNoise<2>::ReadKind(p)) {}
   DifferentialDrive(Params& p, NoiseKind kind)
-      : DifferentialDrive(
+      : DifferentialDrive{
             kind,
             p.PerAxis<2>("noise.wheel_speed", kind == NoiseKind::kDiscrete ? "rad/s" : "rad/s^0.5",
                          "noise of the angular speed of a wheel; a list: left, right",
                          kNonNegative),
             p.Positive("wheel_radius_m", "m", "radius of the wheels"),
-            p.Positive("track_width_m", "m", "distance between the wheels")) {}
+            p.Positive("track_width_m", "m", "distance between the wheels")} {}
 
   NoiseKind noise_kind() const { return noise.kind; }
   template <class T>

@@ -74,7 +74,7 @@ struct Inertial : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>, Vec<3>> {
         gyro_bias_walk(gyro_bias),
         accelerometer_bias_walk(accelerometer_bias) {}
   explicit Inertial(Params& p)
-      : Inertial(
+      : Inertial{
             p.PerAxis<3>("noise.gyro", "rad/s^0.5",
                          "root of the spectral density of the gyroscope's noise", kNonNegative),
             p.PerAxis<3>("noise.accelerometer", "m/s^1.5",
@@ -84,7 +84,7 @@ struct Inertial : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>, Vec<3>> {
             p.NonNegative("noise.gyro_bias", "rad/s^1.5",
                           "standard deviation of the change of the bias in one second", 0.0),
             p.NonNegative("noise.accelerometer_bias", "m/s^2.5",
-                          "standard deviation of the change of the bias in one second", 0.0)) {}
+                          "standard deviation of the change of the bias in one second", 0.0)} {}
 
   template <class T>
   void Step(const T* r, const T* q, const T* v, const T* gyro_bias, const T* accelerometer_bias,

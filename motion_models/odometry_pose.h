@@ -72,7 +72,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
   explicit OdometryPose(Params& p)
       : OdometryPose(p, InputNoise<6>::ReadKind(p) == NoiseKind::kDiscrete) {}
   OdometryPose(Params& p, bool is_discrete)
-      : OdometryPose(
+      : OdometryPose{
             is_discrete ? NoiseKind::kDiscrete : NoiseKind::kContinuous,
             p.PerAxis<3>("noise.linear_velocity", is_discrete ? "m/s" : "m/s^0.5",
                          is_discrete
@@ -86,7 +86,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
                          kNonNegative),
             p.Vector<3>("vehicle_from_cam.position", "m", "position of the camera on the vehicle",
                         {}, std::array<double, 3>{}),
-            ReadVehicleFromCam(p)) {}
+            ReadVehicleFromCam(p)} {}
 
   NoiseKind noise_kind() const { return noise.kind; }
   template <class T>

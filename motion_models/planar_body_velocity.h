@@ -41,11 +41,11 @@ struct PlanarBodyVelocity : Motion<6, Vec<2>, Angle, Vec<2>, Vec<1>> {
   PlanarBodyVelocity(const std::array<double, 2>& acceleration, double angular_acceleration)
       : sigma_v(acceleration), sigma_omega(angular_acceleration) {}
   explicit PlanarBodyVelocity(Params& p)
-      : PlanarBodyVelocity(
+      : PlanarBodyVelocity{
             p.PerAxis<2>("noise.linear_acceleration", "m/s^1.5",
                          "root of the spectral density of the acceleration", kNonNegative),
             p.NonNegative("noise.angular_acceleration", "rad/s^1.5",
-                          "root of the spectral density of the angular acceleration")) {}
+                          "root of the spectral density of the angular acceleration")} {}
 
   template <class T>
   void Step(const T* r, const T* h, const T* v, const T* omega, const T* w, double dt_s, T* r1,

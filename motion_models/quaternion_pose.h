@@ -40,11 +40,11 @@ struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
                  const std::array<double, 3>& angular_acceleration)
       : sigma_a(acceleration), sigma_alpha(angular_acceleration) {}
   explicit QuaternionPose(Params& p)
-      : QuaternionPose(
+      : QuaternionPose{
             p.PerAxis<3>("noise.linear_acceleration", "m/s^2",
                          "standard deviation of the acceleration", kNonNegative),
             p.PerAxis<3>("noise.angular_acceleration", "rad/s^2",
-                         "standard deviation of the angular acceleration", kNonNegative)) {}
+                         "standard deviation of the angular acceleration", kNonNegative)} {}
 
   NoiseKind noise_kind() const { return NoiseKind::kDiscrete; }
   template <class T>

@@ -39,10 +39,10 @@ struct Singer : Motion<3 * D, Vec<D>, Vec<D>, Vec<D>> {
   Singer(double acceleration, double time_constant_s)
       : sigma(acceleration), tau_s(time_constant_s) {}
   explicit Singer(Params& p)
-      : Singer(p.NonNegative("noise.acceleration", "m/s^2",
+      : Singer{p.NonNegative("noise.acceleration", "m/s^2",
                              "standard deviation of the acceleration after a long time"),
                p.Positive("time_constant_s", "s",
-                          "time in which the correlation of the acceleration falls to 1/e")) {}
+                          "time in which the correlation of the acceleration falls to 1/e")} {}
 
   template <class T>
   void Step(const T* p, const T* v, const T* a, const T* w, double dt_s, T* p1, T* v1,

@@ -38,12 +38,12 @@ struct Unicycle : Motion<2, Vec<2>, Angle> {
       : noise{kind, {sigma_speed, sigma_turn_rate}} {}
   explicit Unicycle(Params& p) : Unicycle(p, InputNoise<2>::ReadKind(p)) {}
   Unicycle(Params& p, NoiseKind kind)
-      : Unicycle(
+      : Unicycle{
             kind,
             p.NonNegative("noise.speed", kind == NoiseKind::kDiscrete ? "m/s" : "m/s^0.5",
                           "noise of the speed"),
             p.NonNegative("noise.turn_rate", kind == NoiseKind::kDiscrete ? "rad/s" : "rad/s^0.5",
-                          "noise of the turn rate")) {}
+                          "noise of the turn rate")} {}
 
   NoiseKind noise_kind() const { return noise.kind; }
   template <class T>

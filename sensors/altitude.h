@@ -39,11 +39,11 @@ struct Altitude : Sensor<Vec<1>, Vec<H>, Vec<1>> {
   explicit Altitude(double deviation, double zero_height_pressure_pa = 101325.0)
       : sigma(deviation), zero_height_pa(zero_height_pressure_pa) {}
   explicit Altitude(Params& p)
-      : Altitude(p.Positive(kPressure ? "sigma_pa" : "sigma_m", kUnit,
+      : Altitude{p.Positive(kPressure ? "sigma_pa" : "sigma_m", kUnit,
                             "standard deviation of the measurement"),
                  kPressure
                      ? p.Positive("zero_height_pa", "Pa", "pressure at the height 0", 101325.0)
-                     : 101325.0) {}
+                     : 101325.0} {}
 
   template <class T>
   bool Predict(const T* place, const T* bias, T* z) const {

@@ -45,13 +45,13 @@ struct DepthFeature : LandmarkSensor<DepthFeature<Representation>, Vec<3>, Repre
                double depth_quadratic_1_m = 0.0)
       : DepthFeature(depth_camera, std::array{sigma, sigma}, depth_m, depth_quadratic_1_m) {}
   explicit DepthFeature(Params& p)
-      : DepthFeature(
+      : DepthFeature{
             Camera(p),
             p.PerAxis<2>("sigma_px", "px", "standard deviation of u and v: one number, or [u, v]",
                          kPositive),
             p.Positive("sigma_depth_m", "m", "standard deviation of the depth, constant part"),
             p.NonNegative("sigma_depth_quadratic_1_m", "1/m",
-                          "standard deviation of the depth, coefficient of depth^2", 0.0)) {}
+                          "standard deviation of the depth, coefficient of depth^2", 0.0)} {}
 
   template <class T>
   bool PredictInCamera(const T* h, const T& rho, T* z) const {

@@ -36,9 +36,9 @@ struct Heading {
   explicit Heading(double sigma, double declination = 0.0)
       : sigma_rad(sigma), declination_rad(declination) {}
   explicit Heading(Params& p)
-      : Heading(p.Positive("sigma_rad", "rad", "standard deviation of the heading"),
+      : Heading{p.Positive("sigma_rad", "rad", "standard deviation of the heading"),
                 p.Number("declination_rad", "rad",
-                         "declination; > 0 if magnetic north is east of true north", {}, 0.0)) {}
+                         "declination; > 0 if magnetic north is east of true north", {}, 0.0)} {}
 
   template <class T>
   void SqrtNoise(const T*, const T*, T* L) const {

@@ -39,10 +39,10 @@ struct InverseDepthFeature
   InverseDepthFeature(const Camera& camera_model, double sigma)
       : InverseDepthFeature(camera_model, std::array{sigma, sigma}) {}
   explicit InverseDepthFeature(Params& p)
-      : InverseDepthFeature(
+      : InverseDepthFeature{
             Camera(p),
             p.PerAxis<2>("sigma_px", "px", "standard deviation of u and v: one number, or [u, v]",
-                         kPositive)) {}
+                         kPositive)} {}
 
   template <class T>
   bool PredictInCamera(const T* h, const T&, T* pixel) const {

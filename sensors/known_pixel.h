@@ -39,8 +39,8 @@ struct KnownPixel : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternio
   KnownPixel(const Camera& camera_model, const std::array<double, 2>& sigma)
       : camera(camera_model), sigma_px(sigma) {}
   explicit KnownPixel(Params& p)
-      : KnownPixel(Camera(p),
-                   p.PerAxis<2>("sigma_px", "px", "standard deviation of u and v", kPositive)) {}
+      : KnownPixel{Camera(p),
+                   p.PerAxis<2>("sigma_px", "px", "standard deviation of u and v", kPositive)} {}
 
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* lever_arm, const T* mounting,

@@ -36,8 +36,8 @@ struct Magnetometer : WorldVectorSensor {
   Magnetometer(const std::array<double, 3>& sigma_ut, const std::array<double, 3>& field_ut)
       : WorldVectorSensor(sigma_ut, field_ut) {}
   explicit Magnetometer(Params& p)
-      : Magnetometer(p.PerAxis<3>("sigma_ut", "uT", "standard deviation of the field", kPositive),
-                     ReadField(p)) {}
+      : Magnetometer{p.PerAxis<3>("sigma_ut", "uT", "standard deviation of the field", kPositive),
+                     ReadField(p)} {}
 
   /// Returns m for a world whose x is east, y north and z up.
   static std::array<double, 3> FieldOf(double strength_ut, double inclination_rad,

@@ -15,13 +15,13 @@ struct RangeBearingLimits {
                      double largest_range_m = std::numeric_limits<double>::infinity())
       : sigma_range_m(range_m), sigma_bearing_rad(bearing_rad), max_range_m(largest_range_m) {}
   explicit RangeBearingLimits(Params& p)
-      : RangeBearingLimits(
+      : RangeBearingLimits{
             p.Positive("sigma_range_m", "m", "standard deviation of the range"),
             p.Positive("sigma_bearing_rad", "rad",
                        D == 2 ? "standard deviation of the bearing"
                               : "standard deviation of the bearing, for each of its two axes"),
             p.NumberOrNone("max_range_m", "m", "largest valid range", kPositive)
-                .value_or(std::numeric_limits<double>::infinity())) {}
+                .value_or(std::numeric_limits<double>::infinity())} {}
 
   /// Writes L, D x D.
   template <class T>

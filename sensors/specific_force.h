@@ -43,14 +43,14 @@ struct SpecificForce : WorldVectorSensor {
       : WorldVectorSensor(sigma_m_s2, {-gravity_m_s2[0], -gravity_m_s2[1], -gravity_m_s2[2]}),
         max_acceleration_m_s2(max_acceleration) {}
   explicit SpecificForce(Params& p)
-      : SpecificForce(
+      : SpecificForce{
             p.PerAxis<3>("sigma_m_s2", "m/s^2", "standard deviation of the specific force",
                          kPositive),
             p.Vector<3>("gravity_m_s2", "m/s^2", "gravity in the world", Range{},
                         std::array<double, 3>{0.0, 0.0, -9.80665}),
             p.NumberOrNone("max_acceleration_m_s2", "m/s^2",
                            "largest valid difference of the lengths of z and gravity", kPositive)
-                .value_or(std::numeric_limits<double>::infinity())) {}
+                .value_or(std::numeric_limits<double>::infinity())} {}
 
   bool Valid(const double* z) const {
     const auto length = [](const double* x) {

@@ -35,11 +35,11 @@ struct StereoDisparity : Sensor<Vec<1>, Vec<1>> {
         max_px(min_range_m > 0.0 ? bf_px_m / min_range_m
                                  : std::numeric_limits<double>::infinity()) {}
   explicit StereoDisparity(Params& p)
-      : StereoDisparity(
+      : StereoDisparity{
             p.Positive("focal_px", "px", "rectified focal length"),
             p.Positive("baseline_m", "m", "stereo baseline"),
             p.Positive("sigma_px", "px", "standard deviation of the disparity"),
-            p.NonNegative("min_range_m", "m", "smallest valid depth; 0: no limit", 0.0)) {}
+            p.NonNegative("min_range_m", "m", "smallest valid depth; 0: no limit", 0.0)} {}
 
   template <class T>
   bool Predict(const T* depth, T* disparity) const {

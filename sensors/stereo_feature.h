@@ -39,10 +39,10 @@ struct StereoFeature : LandmarkSensor<StereoFeature<Representation>, Vec<4>, Rep
   StereoFeature(const Camera& left_camera, double baseline, double sigma)
       : StereoFeature(left_camera, baseline, std::array{sigma, sigma}) {}
   explicit StereoFeature(Params& p)
-      : StereoFeature(
+      : StereoFeature{
             Camera(p), p.Positive("camera.baseline_m", "m", "stereo baseline"),
             p.PerAxis<2>("sigma_px", "px", "standard deviation of u and v: one number, or [u, v]",
-                         kPositive)) {
+                         kPositive)} {
     if (camera.model != CameraModel::kPinhole) {
       p.Fail("camera.model",
              "is not 'pinhole'; expected pinhole, because a rectified stereo pair has no "

@@ -79,7 +79,7 @@ struct Inertial : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>, Vec<3>> {
                          "root of the spectral density of the gyroscope's noise", kNonNegative),
             p.PerAxis<3>("noise.accelerometer", "m/s^1.5",
                          "root of the spectral density of the accelerometer's noise", kNonNegative),
-            p.Vector<3>("gravity", "m/s^2", "acceleration of gravity in the world", {},
+            p.Vector<3>("gravity_m_s2", "m/s^2", "acceleration of gravity in the world", {},
                         std::array<double, 3>{0.0, 0.0, -9.80665}),
             p.NonNegative("noise.gyro_bias", "rad/s^1.5",
                           "standard deviation of the change of the bias in one second", 0.0),

@@ -34,16 +34,16 @@ struct Altitude : Sensor<Vec<1>, Vec<H>, Vec<1>> {
   static constexpr Quantity kMeasurement{kPressure ? "pressure" : "height", kUnit,
                                          kPressure ? "pressure of the air" : "height of the body"};
 
-  double sigma, zero_height_pa;
+  double sigma, reference_pressure_pa;
 
   explicit Altitude(double deviation, double zero_height_pressure_pa = 101325.0)
-      : sigma(deviation), zero_height_pa(zero_height_pressure_pa) {}
+      : sigma(deviation), reference_pressure_pa(zero_height_pressure_pa) {}
   explicit Altitude(Params& p)
       : Altitude{p.Positive(kPressure ? "sigma_pa" : "sigma_m", kUnit,
                             "standard deviation of the measurement"),
-                 kPressure
-                     ? p.Positive("zero_height_pa", "Pa", "pressure at the height 0", 101325.0)
-                     : 101325.0} {}
+                 kPressure ? p.Positive("reference_pressure_pa", "Pa", "pressure at the height 0",
+                                        101325.0)
+                           : 101325.0} {}
 
   template <class T>
   bool Predict(const T* place, const T* bias, T* z) const {
@@ -52,7 +52,7 @@ struct Altitude : Sensor<Vec<1>, Vec<H>, Vec<1>> {
     if constexpr (kPressure) {
       const T temperature = 1.0 - kLapse_1_m * height;
       if (!(temperature > T(0.0))) return false;
-      z[0] = zero_height_pa * pow(temperature, kExponent) + bias[0];
+      z[0] = reference_pressure_pa * pow(temperature, kExponent) + bias[0];
     } else {
       z[0] = height + bias[0];
     }

@@ -80,7 +80,7 @@ TEST(Inertial, FallsAndTurns) {
   EXPECT_NEAR(StepWithJacobians(AbiMotion<Inertial<>>(kNoise), x, none, nullptr, 1.0).next[0][2],
               -4.903325, 1e-14);
   MapHost::Values moon = kNoise;
-  moon["gravity"] = {0, 0, -1.62};
+  moon["gravity_m_s2"] = {0, 0, -1.62};
   EXPECT_NEAR(StepWithJacobians(AbiMotion<Inertial<>>(moon), x, none, nullptr, 1.0).next[0][2],
               -0.81, 1e-14);
 }

@@ -19,11 +19,12 @@ INSTANTIATE_TEST_SUITE_P(
                   {{1.0, 2.0, 3.0}, {1, 0, 0, 0}, {0.1, 0.0, -0.1}, {0.1, -0.1, 0.0}}, 0.05),
         MotionRow("attitude", "{noise: {gyro: 0.05}}", Attitude({0.05, 0.05, 0.05}),
                   {{1, 0, 0, 0}, {0.02, 0.01, 0.0}}, 0.05),
-        MotionRow("inertial", "{gravity: [0, 0, -0.1], noise: {gyro: 0.05, accelerometer: 0.1}}",
+        MotionRow("inertial",
+                  "{gravity_m_s2: [0, 0, -0.1], noise: {gyro: 0.05, accelerometer: 0.1}}",
                   Inertial<>({0.05, 0.05, 0.05}, {0.1, 0.1, 0.1}, {0.0, 0.0, -0.1}), kInertial,
                   0.05),
         MotionRow("inertial",
-                  "{integration: midpoint, gravity: [0, 0, -0.1], "
+                  "{integration: midpoint, gravity_m_s2: [0, 0, -0.1], "
                   "noise: {gyro: 0.05, accelerometer: 0.1}}",
                   Inertial<InertialIntegration::kMidpoint>({0.05, 0.05, 0.05}, {0.1, 0.1, 0.1},
                                                            {0.0, 0.0, -0.1}),

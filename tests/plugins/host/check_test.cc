@@ -362,7 +362,7 @@ TEST_F(CheckTest, ShippedModelsPass) {
       {"attitude", "{noise: {gyro: 0.01}}"},
       {"inertial", "{noise: {gyro: 0.01, accelerometer: 0.1}}"},
       {"inertial",
-       "{integration: euler, gravity: [0, 9.81, 0], noise: {gyro: 0.01, accelerometer: 0.1}}"},
+       "{integration: euler, gravity_m_s2: [0, 9.81, 0], noise: {gyro: 0.01, accelerometer: 0.1}}"},
       {"inertial", "{integration: midpoint, noise: {gyro: 0.01, accelerometer: 0.1}}"},
       {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1}"},
       {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1, min_range_m: 0.3}"},

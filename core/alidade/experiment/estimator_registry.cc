@@ -134,6 +134,36 @@ EstimatorType MakeType(const char* name, const char* doc, Options (*read)(Params
 
 }  // namespace
 
+const std::vector<ParamInfo>& CommonEstimatorKeys() {
+  const auto key = [](const char* name, const char* type, const char* fallback, const char* doc,
+                      std::vector<std::string> choices = {}) {
+    return ParamInfo{name, "", doc, type, "", fallback, std::move(choices), ""};
+  };
+  static const std::vector<ParamInfo> keys = {
+      key("type", "text", "the name of the entry", "type of the estimator"),
+      key("sensors", "list", "all",
+          "names of the sensors that the estimator uses, in the order of their updates"),
+      key("use", "choice or map", "all",
+          "all: every measurement; {accepted_by: NAME}: the measurements that the filter NAME "
+          "accepts"),
+      key("invariant_error", "map", "none",
+          "{side: left, blocks: [...]} or {side: right, blocks: [...]}: the error of position, "
+          "orientation and velocity is that of one element of a Euclidean group"),
+      key("expect", "choice", "good",
+          "poor: the entry shows a failure, so the verdict on the run ignores this estimator",
+          {"good", "poor"}),
+      key("on_divergence", "choice", "report", "report: continue the run; fail: end the run",
+          {"report", "fail"}),
+      key("on_plugin_failure", "choice", "skip",
+          "after a failed call of a sensor: skip ignores the measurement, disable ignores the "
+          "sensor until the end of the run, abort ends the run",
+          {"skip", "disable", "abort"}),
+      key("overrides", "map", "none",
+          "state, sensors, landmarks and initial_time_s for this estimator; merged into the "
+          "config")};
+  return keys;
+}
+
 const std::vector<EstimatorType>& EstimatorTypes() {
   static const std::vector<EstimatorType> types = {
       MakeType<Ekf>("ekf", "Extended Kalman filter.", ReadEkf, DescribeEkf),

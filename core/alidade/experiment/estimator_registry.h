@@ -31,6 +31,8 @@ struct EstimatorType {
   std::function<Description(const Node& entry)> describe;
 };
 
+/// Returns the keys that all types of estimator have.
+const std::vector<ParamInfo>& CommonEstimatorKeys();
 /// Returns all built-in types; the first is `ekf`.
 const std::vector<EstimatorType>& EstimatorTypes();
 /// Returns the type with this name, or null.

@@ -46,11 +46,11 @@ ConfigTree* ChildText(const ConfigTree& map, std::string_view key) {
 
 /// Returns the first component of each key that an estimator of this type reads.
 std::set<std::string> KeysOfType(const std::string& type, const PluginHost& host) {
-  std::set<std::string> keys = {"type",   "sensors",       "overrides",         "use",
-                                "expect", "on_divergence", "on_plugin_failure", "invariant_error"};
+  std::set<std::string> keys;
   const auto add = [&](const std::vector<ParamInfo>& schema) {
     for (const ParamInfo& info : schema) keys.insert(info.key.substr(0, info.key.find('.')));
   };
+  add(internal::CommonEstimatorKeys());
   if (const auto* const built_in = internal::FindEstimatorType(type)) add(built_in->schema());
   for (const PluginEntry& entry : host.entries()) {
     if (entry.kind == kEstimatorKind && entry.name == type) add(EstimatorSchema(entry));

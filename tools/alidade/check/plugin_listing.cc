@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <tuple>
 #include <utility>
@@ -56,25 +57,7 @@ bool IsBuiltIn(const PluginEntry& entry) { return entry.plugin.empty(); }
 
 /// Appends to `keys` the keys that all types of estimator have.
 std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
-  const auto add = [&](const char* name, const char* type, const char* fallback, const char* doc,
-                       std::vector<std::string> choices = {}) {
-    keys.push_back({name, "", doc, type, "", fallback, std::move(choices), ""});
-  };
-  add("sensors", "list", "all",
-      "names of the sensors that the estimator uses, in the order of their updates");
-  add("use", "choice or map", "all",
-      "all: every measurement; {accepted_by: NAME}: the measurements that the filter NAME accepts");
-  add("invariant_error", "map", "none",
-      "{side: left, blocks: [...]} or {side: right, blocks: [...]}: the error of position, "
-      "orientation and velocity is that of one element of a Euclidean group");
-  add("on_divergence", "choice", "report", "report: continue the run; fail: end the run",
-      {"report", "fail"});
-  add("on_plugin_failure", "choice", "skip",
-      "after a failed call of a sensor: skip ignores the measurement, disable ignores the sensor "
-      "until the end of the run, abort ends the run",
-      {"skip", "disable", "abort"});
-  add("overrides", "map", "none",
-      "state, sensors, landmarks and initial_time_s for this estimator; merged into the config");
+  std::ranges::copy(internal::CommonEstimatorKeys(), std::back_inserter(keys));
   return keys;
 }
 

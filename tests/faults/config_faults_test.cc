@@ -252,6 +252,15 @@ const Fault kBlockFaults[] = {
         "state.car.noise.angular_acceleration: missing; model 'coordinated_turn' needs it "
         "(rad/s^1.5, >= 0: root of the spectral density of the angular acceleration)\n"),
     MakeFault(
+        "03_angle_in_degrees", "depth",
+        {{"  template:\n",
+          "  car:\n    model: coordinated_turn\n    noise: {acceleration: 1, angular_acceleration: "
+          "1}\n    initial: {position: {sigma: 1}, heading: {mean: 90, sigma: 1}}\n  template:\n"}},
+        13,
+        "state.car.initial.heading.mean: 90 rad is more than a revolution; expected a number in "
+        "rad, "
+        "or a number with a unit, as in 90deg\n"),
+    MakeFault(
         "03_sigma_is_a_list_of_another_size", "depth",
         {After(kTemplateBlocks, "    size: 2"),
          {"{mean: 3.3, sigma: 0.5}", "{mean: [3, 1],\n  sigma: [0.5]}"}},

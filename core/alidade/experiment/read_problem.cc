@@ -12,6 +12,7 @@
 #include <span>
 #include <utility>
 
+#include "alidade/base/number_text.h"
 #include "alidade/base/text.h"
 #include "alidade/config/read_covariance.h"
 #include "alidade/config/tree.h"
@@ -607,6 +608,10 @@ std::vector<double> ReadBlockValue(const Node& node, const Space& space) {
       is_map ? ReadElements(node, geometry) : node.Numbers(geometry.ambient, space.unit);
   if (DistanceFrom(geometry, value.data()) > kUnitTolerance) {
     node.Fail("the value does not have unit length", "a length within 1e-3 of 1");
+  }
+  if (geometry.is_angle() && std::abs(value[0]) > 2.0 * std::numbers::pi) {
+    node.Fail(internal::NumberText(value[0]) + " rad is more than a revolution",
+              "a number in rad, or a number with a unit, as in 90deg");
   }
   if (quaternion >= 0) {
     internal::ChooseSign({}, std::span(value).subspan(static_cast<std::size_t>(quaternion), 4));

@@ -61,7 +61,7 @@ struct Crossed : Sensor<Vec<3>, Vec<3>, Vec<3>> {
 };
 
 /// Returns an inertial problem whose prior sigmas are `scale` times 1 m, 1 m/s, 1 rad and 0.1.
-Problem Body(double scale) {
+Problem BodyInSpace(double scale) {
   Problem problem;
   const double root = std::sqrt(0.5);
   problem.AddState("body", testing::Inertial(),
@@ -115,7 +115,7 @@ INSTANTIATE_TEST_SUITE_P(BothSides, InvariantErrorOf,
                          });
 
 TEST_P(InvariantErrorOf, JacobiansOfTheMotionModelAreTrue) {
-  const Problem body = Body(1.0), plane = PlanarBody();
+  const Problem body = BodyInSpace(1.0), plane = PlanarBody();
   const Problem problem = internal::InvariantProblem(ErrorOf(body, GetParam()), body);
   const SharedMotion& motion = problem.motions[0].model;
   EXPECT_EQ(motion->blocks()[0].geometry.tangent, 9);
@@ -130,7 +130,7 @@ TEST_P(InvariantErrorOf, JacobiansOfTheMotionModelAreTrue) {
 }
 
 TEST_P(InvariantErrorOf, JacobiansOfTheSensorModelsAreTrue) {
-  const Problem body = Body(1.0), plane = PlanarBody();
+  const Problem body = BodyInSpace(1.0), plane = PlanarBody();
   const Problem problem = internal::InvariantProblem(ErrorOf(body, GetParam()), body);
   const auto expect_true = [](const SharedSensor& sensor, Blocks roles) {
     roles = Normalised(sensor->roles(), std::move(roles));
@@ -150,7 +150,7 @@ TEST_P(InvariantErrorOf, JacobiansOfTheSensorModelsAreTrue) {
 // Without biases, the inertial model is group-affine. Then the error obeys a linear equation, also
 // if it is large [Barrau2017] theorem 2.
 TEST_P(InvariantErrorOf, ALargeErrorOfAGroupAffineModelPropagatesLinearly) {
-  const Problem body = Body(1.0);
+  const Problem body = BodyInSpace(1.0);
   const Problem problem = internal::InvariantProblem(ErrorOf(body, GetParam()), body);
   const SharedMotion& motion = problem.motions[0].model;
   const Geometry& group = motion->blocks()[0].geometry;
@@ -220,7 +220,7 @@ double CovarianceDistance(const State& a, const State& b) {
 
 // Both errors are equal to first order, and without measurements the propagation of P is exact.
 TEST_P(InvariantErrorOf, PredictsTheCovarianceOfThePlainFilter) {
-  const Problem problem = Body(0.3);
+  const Problem problem = BodyInSpace(0.3);
   Ekf plain(problem);
   const auto invariant = MakeInvariant(ErrorOf(problem, GetParam()), problem, kEkf);
   plain.Start(0);
@@ -239,7 +239,7 @@ TEST_P(InvariantErrorOf, PredictsTheCovarianceOfThePlainFilter) {
 
 // The errors differ by terms of second order, which are 1e-4 sigma for sigmas of 1e-4.
 TEST_P(InvariantErrorOf, AgreesWithThePlainFilterIfTheErrorsAreSmall) {
-  const Problem problem = Body(1e-4);
+  const Problem problem = BodyInSpace(1e-4);
   Ekf plain(problem);
   const auto invariant = MakeInvariant(ErrorOf(problem, GetParam()), problem, kEkf);
   plain.Start(0);
@@ -263,7 +263,7 @@ TEST_P(InvariantErrorOf, AgreesWithThePlainFilterIfTheErrorsAreSmall) {
 }
 
 TEST_P(InvariantErrorOf, SmoothsLikeThePlainSmootherIfTheErrorsAreSmall) {
-  const Problem problem = Body(1e-4);
+  const Problem problem = BodyInSpace(1e-4);
   const auto make = [](const Problem& of) { return std::make_unique<RtsSmoother>(of); };
   RtsSmoother plain(problem);
   const auto invariant = MakeInvariant(ErrorOf(problem, GetParam()), problem, make);
@@ -286,7 +286,7 @@ TEST_P(InvariantErrorOf, SmoothsLikeThePlainSmootherIfTheErrorsAreSmall) {
 }
 
 TEST_P(InvariantErrorOf, CopiesAreIndependentAndRollBack) {
-  const Problem problem = Body(0.1);
+  const Problem problem = BodyInSpace(0.1);
   std::vector<Frame> frames = Frames(problem, 0.05);
   std::unique_ptr<Estimator> estimator = MakeInvariant(ErrorOf(problem, GetParam()), problem, kEkf);
   estimator->Start(0);
@@ -304,13 +304,13 @@ TEST_P(InvariantErrorOf, CopiesAreIndependentAndRollBack) {
 }
 
 TEST(InvariantError, MessagesReportTheOriginalBlocks) {
-  const Problem problem = Body(0.1);
+  const Problem problem = BodyInSpace(0.1);
   const Problem inner = internal::InvariantProblem(ErrorOf(problem, ErrorSide::kLeft), problem);
   EXPECT_EQ(inner.layout.blocks().back().name, "body.position, body.orientation, body.velocity");
 }
 
 TEST(InvariantError, RefusesBlocksThatAreNotAGroup) {
-  const Problem problem = Body(1.0);
+  const Problem problem = BodyInSpace(1.0);
   const auto defect = [&](const std::vector<std::string>& names, const Problem& of) {
     InvariantError error;
     for (const std::string& name : names) error.blocks.push_back(of.layout.Find(name));

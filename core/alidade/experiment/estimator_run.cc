@@ -115,7 +115,7 @@ std::vector<Event> AngleEvents(const Problem& problem) {
   for (const Prior& prior : problem.priors) {
     const Block& block = problem.layout[prior.block];
     if (!block.geometry().is_angle() || prior.mean.empty()) continue;
-    const double sigma = std::sqrt(prior.covariance(0, 0));
+    const double sigma = prior.covariance.size() > 0 ? std::sqrt(prior.covariance(0, 0)) : 0.0;
     if (std::abs(prior.mean[0]) <= kRevolution && sigma <= kRevolution) continue;
     events.push_back({kNoTimestamp, EventKind::kUnit,
                       "the initial value of angle '" + block.name + "' is " +

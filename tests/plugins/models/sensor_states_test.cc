@@ -128,8 +128,6 @@ TEST(SensorStates, AreConstantIfTheirInitialValueIsExact) {
   const std::string exact = ", initial: {clock_bias: {mean: 3, sigma: 0}}";
   EXPECT_EQ(status(exact + ", dynamics: {clock_bias: constant}"), BlockStatus::kConstant);
   EXPECT_EQ(status(exact + ", dynamics: {clock_bias: {random_walk: 1}}"), BlockStatus::kEstimated);
-  EXPECT_EQ(status(exact + ", dynamics: {clock_bias: constant}, consider: [clock_bias]"),
-            BlockStatus::kConsider);
 }
 
 TEST(SensorStates, CanBeConsidered) {

@@ -85,12 +85,7 @@ class ImageTarget : public Source {
       intrinsics = rectification_->intrinsics();
     }
     tracker_.emplace(options_, intrinsics);
-    const int covariance = estimate_noise_ ? 1 : 0;
-    if (right_) streams_.push_back({.name = "disparity", .covariance = covariance});
-    streams_.push_back({.name = "inverse_scale", .covariance = covariance});
-    if (truth_) {
-      for (const std::string& name : truth_->names()) truths_.push_back({name, 1});
-    }
+    DefineStreams();
     camera_ = CameraSize(arguments, *this);
   }
 
@@ -134,6 +129,14 @@ class ImageTarget : public Source {
   }
 
  private:
+  void DefineStreams() {
+    const int covariance = estimate_noise_ ? 1 : 0;
+    if (right_) streams_.push_back({.name = "disparity", .covariance = covariance});
+    streams_.push_back({.name = "inverse_scale", .covariance = covariance});
+    if (!truth_) return;
+    for (const std::string& name : truth_->names()) truths_.push_back({name, 1});
+  }
+
   std::optional<std::filesystem::path> Find(const Node& entry, const char* key) const {
     const auto node = entry.Find(key);
     if (!node) return std::nullopt;

@@ -98,7 +98,7 @@ class DataFiles {
     const auto index = static_cast<std::size_t>(measurement.stream);
     const StreamInfo& stream = source_.streams()[index];
     const bool is_landmark = measurement.landmark >= 0;
-    const auto covariance_width = static_cast<std::size_t>(stream.covariance * stream.covariance);
+    const auto rows = static_cast<std::size_t>(stream.covariance), covariance_width = rows * rows;
     const bool has_track_rows = is_landmark && (stream.name == "tracks" || stream.name == "known");
     std::optional<CsvFile>& file = streams_[index];
     if (!file) {

@@ -45,11 +45,11 @@ Space SensorKeys::Measurement() const {
   if (parts.size() == 1) return parts[0];
   Space all;
   all.name = "z";
+  all.elements = ColumnsOf(parts);
   std::vector<Geometry> geometries;
   for (const Space& part : parts) {
     all.parts.push_back(part.name);
     all.part_units.push_back(part.unit);
-    for (const std::string& name : ColumnNames(part.name, part)) all.elements.push_back(name);
     geometries.push_back(part.geometry);
     all.doc += (all.doc.empty() ? "" : "; ") + part.doc;
   }

@@ -36,8 +36,8 @@ struct Altitude : Sensor<Vec<1>, Vec<H>, Vec<1>> {
 
   double sigma, reference_pressure_pa;
 
-  explicit Altitude(double deviation, double zero_height_pressure_pa = 101325.0)
-      : sigma(deviation), reference_pressure_pa(zero_height_pressure_pa) {}
+  explicit Altitude(double deviation, double reference_pa = 101325.0)
+      : sigma(deviation), reference_pressure_pa(reference_pa) {}
   explicit Altitude(Params& p)
       : Altitude{p.Positive(kPressure ? "sigma_pa" : "sigma_m", kUnit,
                             "standard deviation of the measurement"),

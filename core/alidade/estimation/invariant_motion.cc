@@ -45,7 +45,7 @@ class InvariantMotion final : public MotionModel {
         if (members_[i] < 0) {
           remaining.push_back(row);
         } else {
-          order[static_cast<std::size_t>(group_.Row(members_[i]) + k)] = row;
+          order.begin()[group_.Row(members_[i]) + k] = row;
         }
       }
     }

@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/estimation/owned_state.h"
 
+#include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
 
 #include "alidade/base/error.h"
 #include "alidade/estimation/direct_models.h"
@@ -68,28 +73,6 @@ struct OwnedVectorMotion : Motion<kDynamic, Vec<kDynamic>> {
   void SqrtQ(double dt_s, MatrixRef q) const { dynamics.SqrtQ(dt_s, size, q); }
 };
 
-/// Motion model of a model parameter state whose geometry has a fixed size.
-template <class G>
-struct OwnedGeometryMotion : Motion<G::kTangent, G> {
-  static constexpr std::array kBlocks{Quantity{"value"}};
-
-  Dynamics dynamics;
-
-  explicit OwnedGeometryMotion(const OwnedRole& owned) : dynamics(owned, G::kTangent) {}
-
-  bool Stationary() const { return dynamics.is_stationary(); }
-  template <class T>
-  void Step(const T* x, const T* w, double dt_s, T* next) const {
-    if (!dynamics.is_gauss_markov()) return G::Plus(x, w, next);
-    T d[G::kTangent], decayed[G::kAmbient];
-    G::Minus(x, dynamics.mean.data(), d);
-    for (T& element : d) element *= dynamics.Decay(dt_s);
-    G::Plus(dynamics.mean.data(), d, decayed);
-    G::Plus(decayed, w, next);
-  }
-  void SqrtQ(double dt_s, MatrixRef q) const { dynamics.SqrtQ(dt_s, G::kTangent, q); }
-};
-
 const char* NameOf(OwnedDynamics dynamics) {
   switch (dynamics) {
     case OwnedDynamics::kRandomWalk:
@@ -102,16 +85,69 @@ const char* NameOf(OwnedDynamics dynamics) {
   return "constant";
 }
 
+/// Motion model of a model parameter state whose geometry has a fixed size.
+class OwnedGeometryMotion final : public MotionModel {
+ public:
+  OwnedGeometryMotion(const Geometry& geometry, const OwnedRole& owned)
+      : OwnedGeometryMotion(geometry, Dynamics(owned, static_cast<std::size_t>(geometry.tangent)),
+                            NameOf(owned.dynamics)) {}
+
+ private:
+  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
+                               detail::kMaxTangent, detail::kMaxTangent>;
+
+  OwnedGeometryMotion(const Geometry& geometry, Dynamics dynamics, std::string name)
+      : MotionModel({.name = std::move(name),
+                     .origin = {},
+                     .blocks = {detail::SpaceOf(Quantity{"value"}, geometry)},
+                     .noise_size = geometry.tangent,
+                     .stationary = dynamics.is_stationary()}),
+        dynamics_(std::move(dynamics)) {}
+
+  Status DoStep(const double* const* blocks, const double*, const double* w, double dt_s,
+                const Output& out) const override {
+    const Geometry& geometry = this->blocks()[0].geometry;
+    const int n = geometry.tangent;
+    if (out.next != nullptr) {
+      // next = y (+) w, and y = x or y = mu (+) a (x (-) mu)
+      double* const next = out.next[0];
+      std::copy_n(blocks[0], geometry.ambient, next);
+      Square dy_dx = Square::Identity(n, n);
+      if (dynamics_.is_gauss_markov()) dy_dx = Decay(geometry, dynamics_.Decay(dt_s), next);
+      if (out.g != nullptr) {
+        Square dnext_dy(n, n);
+        PlusJacobianX(geometry, next, w, dnext_dy.data());
+        Eigen::Map<Square>(out.f, n, n).noalias() = dnext_dy * dy_dx;
+        PlusJacobian(geometry, next, w, out.g);
+      }
+      geometry.Plus(next, w, next);
+    }
+    if (out.sqrt_q != nullptr) dynamics_.SqrtQ(dt_s, n, {out.sqrt_q, n});
+    return Status::kOk;
+  }
+  /// Replaces x by y = mu (+) a (x (-) mu), and returns dy/dx.
+  Square Decay(const Geometry& geometry, double a, double* x) const {
+    const int n = geometry.tangent;
+    const double* const mu = dynamics_.mean.data();
+    std::array<double, detail::kMaxTangent> d;
+    Square dx_dd(n, n), dy_dd(n, n);
+    geometry.Minus(x, mu, d.data());
+    PlusJacobian(geometry, mu, d.data(), dx_dd.data());
+    for (double& element : d) element *= a;
+    PlusJacobian(geometry, mu, d.data(), dy_dd.data());
+    geometry.Plus(mu, d.data(), x);
+    return a * dy_dd * dx_dd.inverse();
+  }
+
+  Dynamics dynamics_;
+};
+
 }  // namespace
 
 SharedMotion OwnedMotion(const Geometry& geometry, const OwnedRole& owned) {
-  const char* const name = NameOf(owned.dynamics);
   ALIDADE_EXPECTS(!geometry.is_product());
-  if (geometry.is_vector()) return MakeMotion(OwnedVectorMotion(owned, geometry.ambient), name);
-  SharedMotion motion;
-  VisitGeometry(geometry.row().number,
-                [&]<class G>(G) { motion = MakeMotion(OwnedGeometryMotion<G>(owned), name); });
-  return motion;
+  if (!geometry.is_vector()) return std::make_shared<OwnedGeometryMotion>(geometry, owned);
+  return MakeMotion(OwnedVectorMotion(owned, geometry.ambient), NameOf(owned.dynamics));
 }
 
 }  // namespace alidade::internal

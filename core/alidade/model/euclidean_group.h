@@ -309,6 +309,12 @@ struct LeftInvariant : Group {
   static void PlusJacobian(const double*, const double* d, double* j) {
     Group::RightJacobian(d, j);
   }
+  static void PlusJacobianX(const double*, const double* d, double* j) {
+    double step[Group::kAmbient], back[Group::kAmbient];
+    Group::Exp(d, step);
+    Group::Inverse(step, back);
+    Group::Adjoint(back, j);
+  }
 };
 
 /// Geometry of a group element with the right-invariant error: x (+) d = Exp(d) x. d is in the
@@ -331,6 +337,11 @@ struct RightInvariant : Group {
     Group::Log(step, d);
   }
   static void PlusJacobian(const double*, const double* d, double* j) { Group::LeftJacobian(d, j); }
+  static void PlusJacobianX(const double*, const double* d, double* j) {
+    double step[Group::kAmbient];
+    Group::Exp(d, step);
+    Group::Adjoint(step, j);
+  }
 };
 
 }  // namespace alidade

@@ -32,6 +32,7 @@
 ///                            vector at x to the tangent space of y; default: the identity
 ///   PlusJacobian(x, d, j)    optional: j = d(x (+) d)/dd, in the tangent space at x (+) d;
 ///                            default: automatic differentiation of Plus and Minus
+///   PlusJacobianX(x, d, j)   optional: j = d(x (+) d)/dx, likewise
 namespace alidade {
 
 /// Size of a block if the size is known only at run time.

@@ -34,23 +34,41 @@ struct GeometryRow {
   /// Null: the transport matrix is the identity.
   void (*transport)(const double* x, const double* y, double* j) = nullptr;
   void (*plus_jacobian)(const double* x, const double* d, double* j) = nullptr;
+  void (*plus_jacobian_x)(const double* x, const double* d, double* j) = nullptr;
 };
 
 namespace detail {
 
-/// Computes j = d(x (+) (d + e))/de at e = 0 by dual numbers. The derivative lies in the tangent
-/// space at x (+) d.
-template <class G>
-void DifferentiatePlus(const double* x, const double* d, double* j) {
-  using Dual = Jet<double, G::kTangent>;
-  Dual dual_d[G::kTangent], y[G::kAmbient], difference[G::kTangent];
+/// Computes j = dy/de. The derivative lies in the tangent space at y.
+template <class G, class Dual>
+void TangentDerivative(const Dual* y, double* j) {
   double base[G::kAmbient];
-  for (int i = 0; i < G::kTangent; ++i) dual_d[i] = Dual(d[i], i);
-  G::Plus(x, dual_d, y);
+  Dual difference[G::kTangent];
   for (int i = 0; i < G::kAmbient; ++i) base[i] = y[i].a;
   G::Minus(y, base, difference);
   for (int i = 0; i < G::kTangent; ++i)
     std::copy_n(difference[i].v, G::kTangent, j + i * G::kTangent);
+}
+
+/// Computes j = d(x (+) (d + e))/de at e = 0 by dual numbers, in the tangent space at x (+) d.
+template <class G>
+void DifferentiatePlus(const double* x, const double* d, double* j) {
+  using Dual = Jet<double, G::kTangent>;
+  Dual dual_d[G::kTangent], y[G::kAmbient];
+  for (int i = 0; i < G::kTangent; ++i) dual_d[i] = Dual(d[i], i);
+  G::Plus(x, dual_d, y);
+  TangentDerivative<G>(y, j);
+}
+
+/// Computes j = d((x (+) e) (+) d)/de at e = 0 likewise.
+template <class G>
+void DifferentiatePlusX(const double* x, const double* d, double* j) {
+  using Dual = Jet<double, G::kTangent>;
+  Dual e[G::kTangent], dual_x[G::kAmbient], y[G::kAmbient];
+  for (int i = 0; i < G::kTangent; ++i) e[i] = Dual(0.0, i);
+  G::Plus(x, e, dual_x);
+  G::Plus(dual_x, d, y);
+  TangentDerivative<G>(y, j);
 }
 
 /// Entry of the table for the struct G of alidade/model/geometry.h.
@@ -81,6 +99,13 @@ struct TypedRow : GeometryRow {
       plus_jacobian = [](const double* x, const double* d, double* j) { G::PlusJacobian(x, d, j); };
     } else {
       plus_jacobian = DifferentiatePlus<G>;
+    }
+    if constexpr (requires(const double* x, double* j) { G::PlusJacobianX(x, x, j); }) {
+      plus_jacobian_x = [](const double* x, const double* d, double* j) {
+        G::PlusJacobianX(x, d, j);
+      };
+    } else {
+      plus_jacobian_x = DifferentiatePlusX<G>;
     }
   }
 };

@@ -108,6 +108,11 @@ void PlusJacobian(const Geometry& geometry, const double* x, const double* d, do
     part.row().plus_jacobian(x + a, d + t, block);
   });
 }
+void PlusJacobianX(const Geometry& geometry, const double* x, const double* d, double* j) {
+  FillByParts(geometry, j, [&](const Geometry& part, int a, int t, double* block) {
+    part.row().plus_jacobian_x(x + a, d + t, block);
+  });
+}
 
 double DistanceFrom(const Geometry& geometry, const double* x) {
   double largest = 0.0;

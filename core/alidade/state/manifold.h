@@ -96,6 +96,8 @@ class Geometry {
 /// Computes j = d(x (+) d)/dd (tangent x tangent, row-major), in the tangent space at x (+) d. The
 /// matrix is the identity for vectors, for angles, and at d = 0.
 void PlusJacobian(const Geometry& geometry, const double* x, const double* d, double* j);
+/// Computes j = d(x (+) d)/dx likewise: the derivative with respect to a tangent vector at x.
+void PlusJacobianX(const Geometry& geometry, const double* x, const double* d, double* j);
 /// Returns the distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and
 /// quaternions, the largest distance of a part for products.
 double DistanceFrom(const Geometry& geometry, const double* x);

@@ -121,6 +121,26 @@ TEST_P(GeometryLaws, ThePlusJacobianIsThatOfPlus) {
   }
 }
 
+TEST_P(GeometryLaws, ThePlusJacobianXIsThatOfPlus) {
+  constexpr double kStep = 1e-6;
+  const auto n = static_cast<std::size_t>(geometry_.tangent);
+  for (int k = 0; k < kPoints; ++k) {
+    const Values x = Point(), d = Step(k % 4 == 0 ? 1e-5 : 0.02 * k / 2.0);
+    const Values y = Plus(x, d);
+    std::vector<double> j(n * n);
+    PlusJacobianX(geometry_, x.data(), d.data(), j.data());
+    for (std::size_t c = 0; c < n; ++c) {
+      Values above{}, below{};
+      above[c] = kStep;
+      below[c] = -kStep;
+      const Values up = Minus(Plus(Plus(x, above), d), y), down = Minus(Plus(Plus(x, below), d), y);
+      for (std::size_t r = 0; r < n; ++r) {
+        EXPECT_NEAR(j[r * n + c], (up[r] - down[r]) / (2.0 * kStep), 1e-8) << k;
+      }
+    }
+  }
+}
+
 TEST_P(GeometryLaws, TransportIsOrthogonalAndTheIdentityAtOnePoint) {
   constexpr double kTransport =
       // The tolerance is the rounding error / (1 + from . to). The smallest divisor here is 1e-4.

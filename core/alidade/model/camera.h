@@ -110,14 +110,16 @@ struct Camera {
       1e-6;  ///< rad^2; below this limit, power series replace sin, cos and atan2
 
   Camera(Params& params, CameraModel type)
-      : Camera(params.Integer("camera.width", "image width in px", 1, 1 << 20),
+      : Camera{params.Integer("camera.width", "image width in px", 1, 1 << 20),
                params.Integer("camera.height", "image height in px", 1, 1 << 20),
                params.Positive("camera.fx", "px", "horizontal focal length"),
                params.Positive("camera.fy", "px", "vertical focal length"),
                params.Number("camera.cx", "px", "u of the principal point"),
-               params.Number("camera.cy", "px", "v of the principal point"), type,
-               ReadRadial(params, type), ReadTangential(params, type),
-               ReadDenominator(params, type)) {}
+               params.Number("camera.cy", "px", "v of the principal point"),
+               type,
+               ReadRadial(params, type),
+               ReadTangential(params, type),
+               ReadDenominator(params, type)} {}
   static std::array<double, 4> ReadRadial(Params& params, CameraModel type) {
     std::array<double, 4> k{};
     if (type == CameraModel::kPinhole) return k;

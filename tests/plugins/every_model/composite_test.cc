@@ -11,8 +11,10 @@ namespace {
 INSTANTIATE_TEST_SUITE_P(
     Composite, EveryModel,
     ::testing::Values(
-        SensorRow("pose", "{sigma_position_m: 0.1, sigma_orientation_rad: [0.01, 0.02, 0.02]}",
-                  Pose<3>({0.1, 0.1, 0.1}, {0.01, 0.02, 0.02}), {kPosition, {0.6, 0.0, 0.8, 0.0}}),
+        StaticSensorRow("pose",
+                        "{sigma_position_m: 0.1, sigma_orientation_rad: [0.01, 0.02, 0.02]}",
+                        Pose<3>({0.1, 0.1, 0.1}, {0.01, 0.02, 0.02}),
+                        {kPosition, {0.6, 0.0, 0.8, 0.0}}),
         SensorRow("range_bearing",
                   "{sigma_range_m: 0.1, sigma_bearing_rad: 0.05, landmarks: {representation: xyz}}",
                   RangeBearing<Xyz>(0.1, 0.05), {kPosition, kOrientation, {0.2, 0.4, 2.0}}),
@@ -27,7 +29,8 @@ INSTANTIATE_TEST_SUITE_P(
                   "{roles: {position: vector(2)}, sigma_position_m: [0.1, 0.2], "
                   "sigma_heading_rad: 0.01}",
                   RelativePose<2>({0.1, 0.2}, {0.01}), {{0.1, -0.1}, {0.5}, {2.0, 0.4}, {-0.3}}),
-        SensorRow("pseudorange", "{sigma_m: 0.5}", Pseudorange(0.5), {{1.0, 2.0, 3.0}, {0.2}})),
+        StaticSensorRow("pseudorange", "{sigma_m: 0.5}", Pseudorange(0.5),
+                        {{1.0, 2.0, 3.0}, {0.2}})),
     RowName);
 
 }  // namespace

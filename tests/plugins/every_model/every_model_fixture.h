@@ -14,8 +14,7 @@
 #include "support/systems.h"
 
 /// Tests of a shipped model, which one struct defines. The model runs as a plugin in the engine and
-/// in the batch, and as a part of a filter composed at compile time. Such a filter takes seconds to
-/// compile, so the rows are divided among several sources.
+/// in the batch, and compiled into the program.
 namespace alidade::testing {
 
 /// Motion model of a block that the tested sensor uses.
@@ -157,23 +156,35 @@ void ExpectSame(const Problem& problem, Filter filter, const Last& last, Inputs.
 /// Model, with its parameters and the data that the tests need.
 struct Row {
   std::string model, parameters;
-  /// Creates a problem with the model of the plugin.
-  std::function<Problem(const PluginHost&, const Node&)> problem;
-  std::function<void(const Problem&)> expect_static_is_engine;
+  std::function<Problem(const PluginHost&, const Node&)> plugin_problem;
+  std::function<Problem()> compiled_problem;
   double nonlinearity;  ///< allowed final difference between batch and filter, in sigmas
+  /// Null: the row has no filter composed at compile time, which takes seconds to compile.
+  std::function<void(const Problem&)> expect_static_is_engine = {};
 };
 inline void PrintTo(const Row& row, std::ostream* out) { *out << row.model << row.parameters; }
 
 template <class Model>
 Row MotionRow(const std::string& name, const std::string& parameters, const Model& model,
               const Means& means, double nonlinearity = 1e-9) {
-  const auto problem = [=](const PluginHost& host, const Node& entry) {
+  const auto problem = [=](const SharedMotion& motion) {
     Problem result;
-    AddMotion(result, "m", host.CreateMotion(name, entry), means);
+    AddMotion(result, "m", motion, means);
     AddAllSeen(result, static_cast<typename Model::Spaces*>(nullptr));
     return result;
   };
-  const auto expect = [=](const Problem& around) {
+  return {name, parameters,
+          [=](const PluginHost& host, const Node& entry) {
+            return problem(host.CreateMotion(name, entry));
+          },
+          [=] { return problem(MakeMotion(model, name)); }, nonlinearity};
+}
+/// Row that also tests a filter composed at compile time.
+template <class Model>
+Row StaticMotionRow(const std::string& name, const std::string& parameters, const Model& model,
+                    const Means& means, double nonlinearity = 1e-9) {
+  Row row = MotionRow(name, parameters, model, means, nonlinearity);
+  row.expect_static_is_engine = [=](const Problem& around) {
     const auto nothing = [](auto&, const Frame&) {};
     if constexpr (Model::Input::kAmbient > 0) {
       const std::vector<double> u = InputOf(Model::Input::kAmbient);
@@ -182,7 +193,7 @@ Row MotionRow(const std::string& name, const std::string& parameters, const Mode
       ExpectSame(around, StaticEkf<Model>(model), nothing);
     }
   };
-  return {name, parameters, problem, expect, nonlinearity};
+  return row;
 }
 
 template <class... G>
@@ -207,17 +218,29 @@ StaticOutcome UpdateAll(Filter& filter, const Model& model, const double* z,
 template <class Model>
 Row SensorRow(const std::string& name, const std::string& parameters, const Model& model,
               const Means& means) {
-  const auto spaces = static_cast<typename Model::Spaces*>(nullptr);
-  const auto problem = [=](const PluginHost& host, const Node& entry) {
+  const auto problem = [=](const SharedSensor& sensor) {
+    const auto spaces = static_cast<typename Model::Spaces*>(nullptr);
     Problem result;
     AddWanders(result, means, spaces);
     AddAllSeen(result, spaces);
     std::vector<std::string> roles;
     for (const Block& block : result.layout.blocks()) roles.push_back(block.name);
-    AddSensor(result, "s", host.CreateSensor(name, entry), roles);
+    AddSensor(result, "s", sensor, roles);
     return result;
   };
-  const auto expect = [=](const Problem& around) {
+  return {name, parameters,
+          [=](const PluginHost& host, const Node& entry) {
+            return problem(host.CreateSensor(name, entry));
+          },
+          [=] { return problem(MakeSensor(model, name)); }, 0.05};
+}
+/// Row that also tests a filter composed at compile time.
+template <class Model>
+Row StaticSensorRow(const std::string& name, const std::string& parameters, const Model& model,
+                    const Means& means) {
+  Row row = SensorRow(name, parameters, model, means);
+  row.expect_static_is_engine = [=](const Problem& around) {
+    const auto spaces = static_cast<typename Model::Spaces*>(nullptr);
     ExpectSame(around, FilterOf(spaces), [&](auto& filter, const Frame& frame) {
       std::vector<double> z = frame.measurements.back().values;
       const std::vector<double>& known = frame.measurements.back().known;
@@ -226,7 +249,7 @@ Row SensorRow(const std::string& name, const std::string& parameters, const Mode
                 StaticOutcome::kAccepted);
     });
   };
-  return {name, parameters, problem, expect, 0.05};
+  return row;
 }
 
 /// Camera with large pixels. For a landmark 2 m ahead, an uncertainty of 0.05 corresponds to about
@@ -253,7 +276,7 @@ class EveryModel : public ::testing::TestWithParam<Row> {
  protected:
   const Row& row_ = GetParam();
   Config parameters_ = Config::FromText(row_.parameters, row_.model);
-  void SetUp() override { system_ = row_.problem(Shipped(), parameters_.root()); }
+  void SetUp() override { system_ = row_.plugin_problem(Shipped(), parameters_.root()); }
   Problem system_;
 };
 

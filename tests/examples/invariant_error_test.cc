@@ -27,7 +27,7 @@ TEST(InvariantError, SuitsEveryTypeOfEstimator) {
     Config config = Config::FromFile(std::string(ALIDADE_SOURCE_DIR) +
                                      "/examples/34_invariant_error/config.yaml");
     config.Set("source.duration_s", "3", "test");
-    const std::string lag = type == "fixed_lag" ? ", lag_s: 1" : "";
+    const std::string lag = type == "fixed_lag" ? ", lag_s: 0.3" : "";
     config.Set("estimators",
                "{plain: {type: " + type + lag + "}, invariant: {type: " + type + lag +
                    ", invariant_error: {side: left, blocks: [body.position, body.orientation, "

@@ -47,10 +47,14 @@ struct BundleFile {
   std::vector<std::int64_t> camera_ids;  ///< libmv, colmap: image; tracks: frame; otherwise empty
   std::vector<std::int64_t> point_ids;   ///< libmv, colmap, tracks: id of the point; else empty
   std::vector<Timestamp> timestamps;     ///< tracks: timestamp of each camera; otherwise empty
-  /// colmap: `ID MODEL WIDTH HEIGHT` of each lens, and the number of its parameters.
-  std::vector<std::string> lenses;
-  std::size_t lens_parameters = 0;
-  std::vector<std::string> images;  ///< colmap: `CAMERA_ID NAME` of each image
+  /// colmap: a camera of the file, in px.
+  struct Lens {
+    std::int64_t id, width, height;
+  };
+  std::vector<Lens> lenses;              ///< colmap: in the order of the intrinsics
+  std::string lens_model;                ///< colmap: model of all lenses
+  std::size_t lens_parameters = 0;       ///< colmap: number of parameters of the model
+  std::vector<std::string> image_names;  ///< colmap: of each camera
   /// colmap: feature of an image. Its point is -1 if it belongs to no point.
   struct Feature {
     std::array<double, 2> z;

@@ -17,18 +17,19 @@ namespace {
 /// principal point is constant, as in the bundle adjuster of COLMAP.
 struct ColmapModel {
   const char* name;
-  const char* lens;        ///< key `lens` of the sensor
-  std::size_t parameters;  ///< number of parameters
-  std::size_t elements;    ///< number of intrinsics of the lens
+  const char* lens;           ///< key `lens` of the sensor
+  std::size_t focal_lengths;  ///< number of the first parameters that are focal lengths
+  std::size_t parameters;     ///< number of parameters
   std::vector<std::string> fixed;
 };
 const std::array<ColmapModel, 5> kModels = {{
-    {"SIMPLE_PINHOLE", "radtan", 3, 8, {"cx", "cy", "k1", "k2", "k3", "p1", "p2"}},
-    {"PINHOLE", "opencv", 4, 8, {"cx", "cy", "k1", "k2", "p1", "p2"}},
-    {"SIMPLE_RADIAL", "radtan", 4, 8, {"cx", "cy", "k2", "k3", "p1", "p2"}},
-    {"RADIAL", "radtan", 5, 8, {"cx", "cy", "k3", "p1", "p2"}},
-    {"OPENCV", "opencv", 8, 8, {"cx", "cy"}},
+    {"SIMPLE_PINHOLE", "radtan", 1, 3, {"cx", "cy", "k1", "k2", "k3", "p1", "p2"}},
+    {"PINHOLE", "opencv", 2, 4, {"cx", "cy", "k1", "k2", "p1", "p2"}},
+    {"SIMPLE_RADIAL", "radtan", 1, 4, {"cx", "cy", "k2", "k3", "p1", "p2"}},
+    {"RADIAL", "radtan", 1, 5, {"cx", "cy", "k3", "p1", "p2"}},
+    {"OPENCV", "opencv", 2, 8, {"cx", "cy"}},
 }};
+constexpr std::size_t kIntrinsics = 8;  ///< of a lens `radtan` or `opencv`
 
 constexpr std::int64_t kMaxId = std::numeric_limits<std::int64_t>::max();
 using Indices = std::map<std::int64_t, int>;  ///< index of each id
@@ -74,13 +75,11 @@ Indices ReadCameras(BundleCursor cursor, BundleFile& file) {
     constexpr std::int64_t kMaxSide = std::numeric_limits<std::int32_t>::max();
     const std::int64_t width = cursor.Integer("the width of an image", 1, kMaxSide);
     const std::int64_t height = cursor.Integer("the height of an image", 1, kMaxSide);
-    file.lenses.push_back(std::to_string(id) + ' ' + model->name + ' ' + std::to_string(width) +
-                          ' ' + std::to_string(height));
-    std::vector<double>& lens = file.problem.intrinsics.emplace_back(model->elements, 0.0);
-    const std::size_t focal_lengths = std::string_view(model->lens) == "opencv" ? 2 : 1;
+    file.lenses.push_back({id, width, height});
+    std::vector<double>& lens = file.problem.intrinsics.emplace_back(kIntrinsics, 0.0);
     for (std::size_t i = 0; i < model->parameters; ++i) {
       lens[i] = cursor.Number("a parameter of a camera");
-      if (i < focal_lengths && !(lens[i] > 0.0))
+      if (i < model->focal_lengths && !(lens[i] > 0.0))
         cursor.Fail("the focal length is not positive", "a positive number in px");
     }
     if (!cursor.IsAtLineEnd()) {
@@ -94,6 +93,7 @@ Indices ReadCameras(BundleCursor cursor, BundleFile& file) {
   file.problem.sensor =
       std::string("{model: self_calibrating_feature, lens: ") + model->lens + ", sigma_px: 1}";
   file.problem.fixed = model->fixed;
+  file.lens_model = model->name;
   file.lens_parameters = model->parameters;
   return lenses;
 }
@@ -124,9 +124,7 @@ void ReadImage(BundleCursor& cursor, const Indices& lenses, Indices& images, Bun
       file.problem.cameras.emplace_back(CameraFromTransform(q, pose.data() + 4, false));
   camera.intrinsics = IndexOf(cursor, "the id of a camera in cameras.txt", lenses);
   file.poses.push_back({camera, pose});
-  const std::string& lens = file.lenses[static_cast<std::size_t>(camera.intrinsics)];
-  file.images.push_back(lens.substr(0, lens.find(' ')) + ' ' +
-                        std::string(cursor.RemainderOfLine()));
+  file.image_names.emplace_back(cursor.RemainderOfLine());
 }
 
 /// Reads the second line of an image, `X Y POINT3D_ID` for each feature.
@@ -173,7 +171,9 @@ ColmapTexts ColmapTextsOf(const BundleFile& file) {
                     "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# X Y POINT3D_ID ...\n",
                     "# POINT3D_ID X Y Z R G B ERROR IMAGE_ID POINT2D_INDEX ...\n"};
   for (std::size_t i = 0; i < file.lenses.size(); ++i) {
-    texts.cameras += file.lenses[i];
+    const BundleFile::Lens& lens = file.lenses[i];
+    texts.cameras += std::to_string(lens.id) + ' ' + file.lens_model + ' ' +
+                     std::to_string(lens.width) + ' ' + std::to_string(lens.height);
     for (std::size_t k = 0; k < file.lens_parameters; ++k)
       AppendNumber(texts.cameras += ' ', problem.intrinsics[i][k]);
     texts.cameras += '\n';
@@ -188,7 +188,8 @@ ColmapTexts ColmapTextsOf(const BundleFile& file) {
     }
     texts.images += std::to_string(file.camera_ids[i]);
     for (std::size_t k = 0; k < 7; ++k) AppendNumber(texts.images += ' ', pose[k]);
-    texts.images += ' ' + file.images[i] + '\n';
+    const auto lens = static_cast<std::size_t>(problem.cameras[i].intrinsics);
+    texts.images += ' ' + std::to_string(file.lenses[lens].id) + ' ' + file.image_names[i] + '\n';
     const auto& features = file.features[i];
     for (std::size_t k = 0; k < features.size(); ++k) {
       for (const double x : features[k].z) AppendNumber(texts.images, x), texts.images += ' ';

@@ -105,6 +105,18 @@ void AddEquations(const std::string& name, const std::string& model,
   }
 }
 
+/// Returns true unless all blocks of a motion model are constant.
+bool HasEffect(const Problem& problem, const MotionBinding& motion) {
+  return std::ranges::any_of(motion.blocks, [&](BlockId id) {
+    return problem.layout[id].status != BlockStatus::kConstant;
+  });
+}
+
+/// Returns the name of a block without that of its entry `owner`.
+std::string NameWithin(const std::string& owner, const std::string& block) {
+  return block.starts_with(owner + '.') ? block.substr(owner.size() + 1) : block;
+}
+
 ExplainedTable MotionTable(const Problem& problem, double step_s) {
   const bool has_input = std::ranges::any_of(
       problem.motions, [](const MotionBinding& motion) { return motion.model->has_input(); });
@@ -112,14 +124,15 @@ ExplainedTable MotionTable(const Problem& problem, double step_s) {
   std::vector<TextRow>& rows = table.rows;
   if (has_input) rows[0].emplace_back("control input");
   for (const MotionBinding& motion : problem.motions) {
+    if (!HasEffect(problem, motion)) continue;
     std::vector<std::string> blocks;
     for (const BlockId id : motion.blocks) {
       if (problem.layout[id].status == BlockStatus::kConstant) continue;
-      blocks.push_back(problem.layout[id].name);
+      blocks.push_back(NameWithin(motion.name, problem.layout[id].name));
     }
     const int noise = motion.model->noise_size();
     const char* const kind = motion.model->discrete_noise() ? " discrete" : " continuous";
-    rows.push_back({motion.name, motion.model->name(), blocks.empty() ? "none" : Join(blocks),
+    rows.push_back({motion.name, motion.model->name(), Join(blocks),
                     noise == 0 ? "none" : std::to_string(noise) + kind});
     if (has_input) rows.back().push_back(InputText(motion));
     const MotionModel::Description& description = motion.model->description();
@@ -143,6 +156,18 @@ const char* ModeText(RoleMode mode) {
       break;
   }
   return "known";
+}
+
+/// Removes the column `name` if each of its cells is `usual` or empty.
+void RemoveUsualColumn(const std::string& name, const std::string& usual,
+                       std::vector<TextRow>& rows) {
+  const auto column = std::ranges::find(rows[0], name) - rows[0].begin();
+  const bool is_usual = std::all_of(rows.begin() + 1, rows.end(), [&](const TextRow& row) {
+    const std::string& cell = row[static_cast<std::size_t>(column)];
+    return cell.empty() || cell == usual;
+  });
+  if (!is_usual) return;
+  for (TextRow& row : rows) row.erase(row.begin() + column);
 }
 
 ExplainedTable SensorTable(const Problem& problem) {
@@ -172,6 +197,8 @@ ExplainedTable SensorTable(const Problem& problem) {
       rows.push_back(std::move(row));
     }
   }
+  RemoveUsualColumn("mode", ModeText(RoleMode::kEstimate), rows);
+  RemoveUsualColumn("jacobian_at", "prediction", rows);
   return table;
 }
 
@@ -188,6 +215,7 @@ ExplainedTable EffectTable(const Problem& problem) {
     rows[0].back() = name;
   };
   for (const MotionBinding& motion : problem.motions) {
+    if (!HasEffect(problem, motion)) continue;
     add_column(motion.name);
     for (const BlockId id : motion.blocks) {
       const bool constant = problem.layout[id].status == BlockStatus::kConstant;

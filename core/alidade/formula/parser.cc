@@ -70,11 +70,11 @@ class Parser {
   }
   [[noreturn]] void FailHere(const std::string& expected) {
     SkipSpace();
-    const bool is_end = offset_ == text_.size();
-    Fail(
-        offset_,
-        is_end ? "the expression ends too early" : "unexpected " + Quoted(text_.substr(offset_, 1)),
-        expected);
+    if (offset_ < text_.size())
+      Fail(offset_, "unexpected " + Quoted(text_.substr(offset_, 1)), expected);
+    const bool is_cut = expected.ends_with("','") && !node_.tree().quoted;
+    Fail(offset_, "the expression ends too early",
+         expected + (is_cut ? ", or quotes, because a comma within { } ends the expression" : ""));
   }
 
   void SkipSpace() {

@@ -143,7 +143,10 @@ TEST(Expression, ErrorsHaveTheColumnInTheFile) {
             "f.yaml:1:17 z.range: there is no element 'x'; expected no element, because this is a "
             "number");
   EXPECT_EQ(ErrorOf("norm(p"),
-            "f.yaml:1:18 z.range: the expression ends too early; expected ')' or ','");
+            "f.yaml:1:18 z.range: the expression ends too early; expected ')' or ',', or quotes, "
+            "because a comma within { } ends the expression");
+  EXPECT_EQ(ErrorOf("'norm(p'"),
+            "f.yaml:1:19 z.range: the expression ends too early; expected ')' or ','");
   EXPECT_EQ(ErrorOf("p * p"),
             "f.yaml:1:14 z.range: the product of two vectors; expected dot(a, b) or cross(a, b)");
   EXPECT_EQ(ErrorOf("1 / p"),

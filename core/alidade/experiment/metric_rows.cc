@@ -227,17 +227,20 @@ TableRow UsedRow(const RunResult& result, const std::string& sensor) {
   return row;
 }
 
-/// Returns true if the verdict is bad, and a mean NEES or NIS is outside its 95 % bounds.
+/// Returns true if the verdict is bad, and a mean NEES or NIS is outside its 95 % bounds. If the
+/// verdict is overconfident or underconfident, only a mean on that side is an alarm.
 bool IsAlarm(const EstimatorResult& estimator, const MetricKey& key) {
-  if (estimator.verdict.state >= VerdictState::kNotTested || !key.name.ends_with(".mean")) {
-    return false;
-  }
+  const VerdictState state = estimator.verdict.state;
+  if (state >= VerdictState::kNotTested || !key.name.ends_with(".mean")) return false;
   const std::string kind = key.name.substr(0, key.name.find('.'));
   const auto value = [&](const std::string& name) {
     const auto found = estimator.metrics.find(MetricKey{name, key.subject, key.segment}.text());
     return found == estimator.metrics.end() ? std::nan("") : found->second;
   };
-  return value(key.name) < value(kind + ".low") || value(key.name) > value(kind + ".high");
+  const bool is_above = value(key.name) > value(kind + ".high");
+  const bool is_below = value(key.name) < value(kind + ".low");
+  return (is_above && state != VerdictState::kUnderconfident) ||
+         (is_below && state != VerdictState::kOverconfident);
 }
 
 /// Returns the row of a metric for the table of a run. Marks alarms by ` !`.

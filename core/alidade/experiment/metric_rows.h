@@ -22,7 +22,7 @@ std::vector<TableRow> MetricRows(const RunResult& result);
 /// Returns the rows of these metrics.
 std::vector<TableRow> MetricRows(const RunResult& result, const std::vector<std::string>& keys);
 /// Returns the row `verdict`, MetricRows() and the rows of all counts. If the verdict on an
-/// estimator is bad, ` !` marks each mean NEES and NIS outside its bounds.
+/// estimator is bad, ` !` marks each mean NEES and NIS outside its bounds that agrees with it.
 std::vector<TableRow> ComparisonRows(const RunResult& result);
 /// Returns the subjects of rows in the order of the config: the blocks, their owners and the
 /// sensors of each estimator.

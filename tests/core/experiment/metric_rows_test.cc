@@ -52,6 +52,26 @@ TEST(ComparisonTable, OrdersScalesAndAligns) {
             "gated stereo                                  1                -\n");
 }
 
+TEST(ComparisonTable, MarksTheMeansThatAgreeWithABadVerdict) {
+  const auto mean = [](double nees, double nis, VerdictState state) {
+    RunResult result;
+    result.estimators = {Named("ekf", {{"nees.mean:target", nees},
+                                       {"nees.low:target", 0.8},
+                                       {"nees.high:target", 1.2},
+                                       {"nis.mean:stereo", nis},
+                                       {"nis.low:stereo", 0.9},
+                                       {"nis.high:stereo", 1.1}})};
+    result.estimators[0].verdict.state = state;
+    std::string cells;
+    for (const auto& row : internal::ComparisonRows(result)) cells += row.cells[0] + "; ";
+    return cells;
+  };
+  EXPECT_EQ(mean(1.3, 0.5, VerdictState::kUnderconfident), "underconfident; 1.30; 0.500 !; ");
+  EXPECT_EQ(mean(1.3, 0.5, VerdictState::kOverconfident), "overconfident; 1.30 !; 0.500; ");
+  EXPECT_EQ(mean(1.3, 0.5, VerdictState::kLost), "lost; 1.30 !; 0.500 !; ");
+  EXPECT_EQ(mean(1.3, 0.5, VerdictState::kConsistent), "consistent; 1.30; 0.500; ");
+}
+
 TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
   RunResult result;
   const double inf = std::numeric_limits<double>::infinity();

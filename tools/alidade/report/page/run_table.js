@@ -68,18 +68,24 @@ function ratioColumns(kind) {
     sub: '1 is ideal',
     title: RATIO_TITLES[kind],
     get: (e) => e.metrics[prefix + subject],
-    show: ({metrics}) => {
-      const bounds = ['low', 'high'].map((end) => metrics[`${kind}.${end}:${subject}`]);
-      return boundedNumber(metrics[prefix + subject], ...bounds);
+    show: (e) => {
+      const bounds = ['low', 'high'].map((end) => e.metrics[`${kind}.${end}:${subject}`]);
+      const marks = RATIO_MARKS[verdictOf(e).state] ?? '▲▼';
+      return boundedNumber(e.metrics[prefix + subject], marks, ...bounds);
     },
   }));
 }
 
-/** A number with ▲ or ▼ if it is above or below its 95 % bounds. An exact zero is not marked. */
-function boundedNumber(value, low = null, high = null) {
+/** The marks that agree with a verdict; those of all other verdicts are both. */
+const RATIO_MARKS = {overconfident: '▲', underconfident: '▼', consistent: '', 'not tested': ''};
+
+/** A number with ▲ or ▼ if it is above or below its 95 % bounds and `marks` contains the mark. An
+ * exact zero is not marked. */
+function boundedNumber(value, marks, low = null, high = null) {
   if (value === undefined || value === null) return element('span', {class: 'calm'}, '–');
   if (low === null || high === null) return element('span', {}, numberText(value));
-  const mark = value > high ? '▲' : value < low && value !== 0 ? '▼' : '';
+  const outside = value > high ? '▲' : value < low && value !== 0 ? '▼' : '';
+  const mark = marks.includes(outside) ? outside : '';
   const title = `95 % bounds ${numberText(low)} to ${numberText(high)}`;
   const tag = mark && element('span', {class: 'tag'}, mark);
   return element('span', {class: mark ? 'warn' : '', title}, numberText(value), tag);
@@ -142,7 +148,7 @@ function metricFold(parent) {
 /** The table with its legend and buttons. */
 function runTablePanel() {
   const table = runTable();
-  const legend = 'Bold: best of its column. ▲ above, ▼ below its 95 % bounds.';
+  const legend = 'Bold: best of its column. ▲ above, ▼ below its 95 % bounds, as the verdict says.';
   const buttons = [
     copyButton(() => markdownText(table), 'copy as Markdown'),
     copyButton(() => latexText(table), 'copy as LaTeX'),

@@ -78,9 +78,9 @@ struct TableField {
   std::optional<KnownTable::Id> id;       ///< only id whose rows the stream uses
   std::optional<TableColumn> landmark, valid;
   std::vector<RowCondition> conditions;
-  Timestamp delay = 0;                 ///< time from the measurement to the time of its row
-  Timestamp min_interval = INT64_MIN;  ///< shortest time between rows that the stream uses
-  bool goes_blind = false;             ///< true if the stream is dropped after `blind_after`
+  Timestamp delay = 0;                    ///< time from the measurement to the time of its row
+  std::optional<Timestamp> min_interval;  ///< shortest time between rows that the stream uses
+  bool goes_blind = false;                ///< true if the stream is dropped after `blind_after`
 };
 
 /// Times of the rows of a table.

@@ -203,10 +203,9 @@ void TableReader::CheckOrder(Timestamp timestamp) const {
 bool TableReader::IsBeyondGap(Timestamp timestamp) {
   constexpr int kMaxSkipped = 100;
   const TableTime& time = layout_.time;
-  // The difference of two timestamps can exceed the range of a Timestamp, but not that of uint64_t.
-  const auto step = static_cast<std::uint64_t>(timestamp) - static_cast<std::uint64_t>(newest_);
-  const bool is_beyond = time.max_gap && rows_ > 0 && timestamp > newest_ &&
-                         step > static_cast<std::uint64_t>(*time.max_gap);
+  const bool is_beyond =
+      time.max_gap && rows_ > 0 && timestamp > newest_ &&
+      TimeBetween(newest_, timestamp) > static_cast<std::uint64_t>(*time.max_gap);
   skipped_ = is_beyond ? skipped_ + 1 : 0;
   if (!is_beyond || (time.skips_gaps && skipped_ <= kMaxSkipped)) return is_beyond;
   const std::string gap = internal::SecondsText(*time.max_gap);

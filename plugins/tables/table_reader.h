@@ -15,6 +15,11 @@
 
 namespace alidade {
 
+/// Returns the time from `earlier` to `later` in ns, which can exceed the range of a Timestamp.
+inline std::uint64_t TimeBetween(Timestamp earlier, Timestamp later) {
+  return static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier);
+}
+
 /// Reader of the rows of one table, in constant memory. It reads a row only when Read() is called.
 class TableReader {
  public:

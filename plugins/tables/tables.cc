@@ -214,9 +214,7 @@ class TablesSource : public Source {
     for (const Table& table : tables_) {
       const TableReader& reader = *table.reader;
       const std::optional<TableColumn>& column = reader.layout().time.column;
-      // The difference of two timestamps can exceed the range of a Timestamp.
-      const auto step = static_cast<std::uint64_t>(reader.timestamp()) -
-                        static_cast<std::uint64_t>(first.timestamp());
+      const std::uint64_t step = TimeBetween(first.timestamp(), reader.timestamp());
       if (!reader.has_row() || !column || step <= kYear) continue;
       reader.row().Fail(*column,
                         "is more than a year after the first time of " + first.name() + ", " +
@@ -275,7 +273,9 @@ class TablesSource : public Source {
 
   /// Returns true if the stream uses a row at `timestamp`. `last` is the time of the last used row.
   static bool IsDue(Timestamp timestamp, Timestamp last, const TableField& field) {
-    return last == kNoTimestamp || timestamp == last || timestamp - last >= field.min_interval;
+    if (!field.min_interval || last == kNoTimestamp || timestamp == last) return true;
+    return timestamp > last &&
+           TimeBetween(last, timestamp) >= static_cast<std::uint64_t>(*field.min_interval);
   }
 
   /// Returns the pending frame at `timestamp`, to which the row of `reader` adds.

@@ -283,6 +283,7 @@ TEST_F(Tables, ARowTooFarAheadIsAnError) {
 TEST_F(Tables, TheLargestStepsDoNotOverflow) {
   Write("t_s,x\n-9.1e9,1\n9.1e9,2\n");
   EXPECT_EQ(Frames("path: a.csv\nstreams: {x: x}\n").size(), 2u);
+  EXPECT_EQ(Frames("path: a.csv\nstreams: {x: {columns: x, min_interval_s: 1}}\n").size(), 2u);
   EXPECT_EQ(Frames("path: a.csv\nmax_gap_s: 8e9\non_gap: skip\nstreams: {x: x}\n").size(), 1u);
 }
 

@@ -9,6 +9,7 @@
 
 #include <thread>
 
+#include "support/peak_memory.h"
 #include "tables_fixture.h"
 
 namespace alidade::testing {
@@ -101,16 +102,6 @@ TEST_F(Tables, NoticesAFileThatChangesWhileItIsRead) {
 
 TEST_F(Tables, StreamsALongFileInConstantMemory) {
   // A thread writes 2e6 rows, about 40 MB, to a pipe. The peak memory may grow by 4 MB.
-  const auto peak_kb = [] {
-    std::ifstream status("/proc/self/status");
-    for (std::string word; status >> word;) {
-      if (word == "VmHWM:") {
-        status >> word;
-        return std::stol(word);
-      }
-    }
-    return 0L;
-  };
   ASSERT_EQ(mkfifo(File().c_str(), 0600), 0);
   std::thread writer([&] {
     std::ofstream out(File());
@@ -119,12 +110,12 @@ TEST_F(Tables, StreamsALongFileInConstantMemory) {
   });
   const auto source = Open("path: a.csv\nstreams: {z: z}\n");
   SourceFrame frame;
-  const long before = peak_kb();
+  const long before = PeakMemory();
   int count = 0;
   while (source->Next(frame)) ++count;
   writer.join();
   EXPECT_EQ(count, 2000000);
-  EXPECT_LT(peak_kb() - before, 4096);
+  EXPECT_LT(PeakMemory() - before, 4096);
 }
 
 }  // namespace

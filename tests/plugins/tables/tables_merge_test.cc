@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "alidade/io/log.h"
+#include "support/peak_memory.h"
 #include "tables_fixture.h"
 
 namespace alidade::testing {
@@ -86,15 +87,6 @@ TEST_F(Tables, AFaultNamesItsFile) {
 
 // Each table has 300 000 rows. The peak memory may grow by 4 MB.
 TEST_F(Tables, MergesLongPipesInConstantMemory) {
-  const auto peak_kb = [] {
-    std::ifstream status("/proc/self/status");
-    for (std::string word; status >> word;) {
-      if (word != "VmHWM:") continue;
-      status >> word;
-      return std::stol(word);
-    }
-    return 0L;
-  };
   std::vector<std::thread> writers;
   for (const char* name : {"a.csv", "b.csv"}) {
     ASSERT_EQ(mkfifo((folder_ / name).c_str(), 0600), 0);
@@ -108,7 +100,7 @@ TEST_F(Tables, MergesLongPipesInConstantMemory) {
       "files: [{path: a.csv, streams: {a: {columns: z, delay_s: 20}}}, {path: b.csv, streams: {b: "
       "z}}]\n");
   SourceFrame frame;
-  const long before = peak_kb();
+  const long before = PeakMemory();
   int measurements = 0;
   Timestamp last = kNoTimestamp;
   while (source->Next(frame)) {
@@ -118,7 +110,7 @@ TEST_F(Tables, MergesLongPipesInConstantMemory) {
   }
   for (std::thread& writer : writers) writer.join();
   EXPECT_EQ(measurements, 600000);
-  EXPECT_LT(peak_kb() - before, 4096);
+  EXPECT_LT(PeakMemory() - before, 4096);
 }
 
 // ---- delays -------------------------------------------------------------------------------------

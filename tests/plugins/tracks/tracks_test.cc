@@ -9,7 +9,7 @@
 #include <cmath>
 #include <thread>
 
-#include "support/sanitized.h"
+#include "support/peak_memory.h"
 #include "tracks_fixture.h"
 
 namespace alidade::testing {
@@ -193,15 +193,6 @@ TEST_F(TracksTest, ReadsAPipeAsItIsWritten) {
 // Tests fault 47 of tests/faults/README.md.
 TEST_F(TracksTest, StreamsALongFileInConstantMemory) {
   // A thread writes 2e6 rows, about 30 MB, to a pipe. The peak memory may grow by 4 MB.
-  const auto peak_kb = [] {
-    std::ifstream status("/proc/self/status");
-    for (std::string word; status >> word;) {
-      if (word != "VmHWM:") continue;
-      status >> word;
-      return std::stol(word);
-    }
-    return 0L;
-  };
   ASSERT_EQ(mkfifo(File().c_str(), 0600), 0);
   std::thread writer([&] {
     std::ofstream out(File());
@@ -213,14 +204,12 @@ TEST_F(TracksTest, StreamsALongFileInConstantMemory) {
   });
   const auto source = Open();
   SourceFrame frame;
-  const long before = peak_kb();
+  const long before = PeakMemory();
   std::size_t count = 0;
   while (source->Next(frame)) count += frame.measurements.size();
   writer.join();
   EXPECT_EQ(count, 1000000u);
-  if (!kSanitized) {
-    EXPECT_LT(peak_kb() - before, 4096);
-  }
+  EXPECT_LT(PeakMemory() - before, 4096);
 }
 
 TEST_F(TracksTest, ReadsRealTracks) {

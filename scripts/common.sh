@@ -9,7 +9,8 @@
 jobs=$(nproc)
 memory_jobs=$(awk '/^MemAvailable:/ { print int($2 / 2097152) }' /proc/meminfo)
 ((memory_jobs < jobs)) && jobs=$((memory_jobs > 1 ? memory_jobs : 1))
-export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-$jobs}
+# One more test than processors, because many tests wait.
+export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-$((jobs + 1))}
 export CMAKE_BUILD_PARALLEL_LEVEL=${CMAKE_BUILD_PARALLEL_LEVEL:-$jobs}
 
 if command -v ccache >/dev/null; then

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "alidade/estimation/ekf_equations.h"
+#include "alidade/experiment/name_in_entry.h"
 #include "alidade/experiment/truth_match.h"
 #include "alidade/model/landmark.h"
 
@@ -61,9 +62,7 @@ std::string WhyNoMap(const Problem& problem) {
 }
 
 /// Returns the ID in the name of a landmark block, `landmarks.ID.role#N`.
-std::int64_t LandmarkOf(const Block& block) {
-  return std::stoll(block.name.substr(block.owner.size() + 1));
-}
+std::int64_t LandmarkOf(const Block& block) { return std::stoll(NameInEntry(block)); }
 
 /// Returns the values of a landmark at p in the given representation. The anchor is p - (0, 0, 1)
 /// m. Measurements of the landmark do not depend on the anchor.

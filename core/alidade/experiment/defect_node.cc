@@ -4,10 +4,10 @@
 #include <string>
 #include <string_view>
 
+#include "alidade/experiment/name_in_entry.h"
+
 namespace alidade::internal {
 namespace {
-
-std::string NameInEntry(const Block& block) { return block.name.substr(block.owner.size() + 1); }
 
 /// Returns the item of the list `consider` that names `block`. `state` is the state entry of the
 /// block.

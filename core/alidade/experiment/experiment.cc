@@ -7,6 +7,7 @@
 #include "alidade/experiment/build_estimator.h"
 #include "alidade/experiment/calibration.h"
 #include "alidade/experiment/estimator_guide.h"
+#include "alidade/experiment/name_in_entry.h"
 #include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/read_report.h"
 #include "alidade/experiment/run.h"
@@ -145,7 +146,7 @@ void CheckTruths(const Node& source, const Experiment& experiment, const Problem
     std::vector<std::string> names;
     for (const Block& block : full_problem.layout.blocks()) {
       names.push_back(block.name);
-      names.push_back(block.name.substr(block.owner.size() + 1));
+      names.push_back(internal::NameInEntry(block));
     }
     std::erase(names, name);
     node.Fail("the truth does not match a block: " + reason,

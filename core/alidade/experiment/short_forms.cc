@@ -13,6 +13,7 @@
 #include "alidade/config/tree.h"
 #include "alidade/experiment/estimator_plugin.h"
 #include "alidade/experiment/estimator_registry.h"
+#include "alidade/experiment/name_in_entry.h"
 #include "alidade/experiment/read_problem.h"
 #include "alidade/plugin/built_in_models.h"
 
@@ -28,6 +29,7 @@ using internal::FillText;
 using internal::Join;
 using internal::KeyPlace;
 using internal::kFormula;
+using internal::NameInEntry;
 using internal::PathOf;
 using internal::Quoted;
 using internal::Remove;
@@ -131,9 +133,6 @@ StateLayout ExpandStates(const ConfigTree& root, const PluginHost& host) {
   }
   return blocks;
 }
-
-/// Returns the name of the block in its entry.
-std::string NameInEntry(const Block& block) { return block.name.substr(block.owner.size() + 1); }
 
 /// Returns whether the units do not differ. A unit that is not declared is not compared.
 bool HasUnitOf(const Space& block, const Space& role) {

@@ -9,6 +9,7 @@
 #include "alidade/base/text.h"
 #include "alidade/check/explain_parts.h"
 #include "alidade/estimation/observability.h"
+#include "alidade/experiment/name_in_entry.h"
 #include "alidade/experiment/truth_match.h"
 #include "alidade/plugin/built_in_models.h"
 
@@ -112,11 +113,6 @@ bool HasEffect(const Problem& problem, const MotionBinding& motion) {
   });
 }
 
-/// Returns the name of a block without that of its entry `owner`.
-std::string NameWithin(const std::string& owner, const std::string& block) {
-  return block.starts_with(owner + '.') ? block.substr(owner.size() + 1) : block;
-}
-
 ExplainedTable MotionTable(const Problem& problem, double step_s) {
   const bool has_input = std::ranges::any_of(
       problem.motions, [](const MotionBinding& motion) { return motion.model->has_input(); });
@@ -128,7 +124,7 @@ ExplainedTable MotionTable(const Problem& problem, double step_s) {
     std::vector<std::string> blocks;
     for (const BlockId id : motion.blocks) {
       if (problem.layout[id].status == BlockStatus::kConstant) continue;
-      blocks.push_back(NameWithin(motion.name, problem.layout[id].name));
+      blocks.push_back(NameInEntry(problem.layout[id]));
     }
     const int noise = motion.model->noise_size();
     const char* const kind = motion.model->discrete_noise() ? " discrete" : " continuous";
@@ -158,15 +154,15 @@ const char* ModeText(RoleMode mode) {
   return "known";
 }
 
-/// Removes the column `name` if each of its cells is `usual` or empty.
-void RemoveUsualColumn(const std::string& name, const std::string& usual,
-                       std::vector<TextRow>& rows) {
+/// Removes the column `name` if each of its cells is `default_text` or empty.
+void RemoveDefaultColumn(const std::string& name, const std::string& default_text,
+                         std::vector<TextRow>& rows) {
   const auto column = std::ranges::find(rows[0], name) - rows[0].begin();
-  const bool is_usual = std::all_of(rows.begin() + 1, rows.end(), [&](const TextRow& row) {
+  const bool is_default = std::all_of(rows.begin() + 1, rows.end(), [&](const TextRow& row) {
     const std::string& cell = row[static_cast<std::size_t>(column)];
-    return cell.empty() || cell == usual;
+    return cell.empty() || cell == default_text;
   });
-  if (!is_usual) return;
+  if (!is_default) return;
   for (TextRow& row : rows) row.erase(row.begin() + column);
 }
 
@@ -197,8 +193,8 @@ ExplainedTable SensorTable(const Problem& problem) {
       rows.push_back(std::move(row));
     }
   }
-  RemoveUsualColumn("mode", ModeText(RoleMode::kEstimate), rows);
-  RemoveUsualColumn("jacobian_at", "prediction", rows);
+  RemoveDefaultColumn("mode", ModeText(RoleMode::kEstimate), rows);
+  RemoveDefaultColumn("jacobian_at", "prediction", rows);
   return table;
 }
 

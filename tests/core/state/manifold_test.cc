@@ -99,44 +99,33 @@ TEST_P(GeometryLaws, PlusStaysOnTheManifoldAndMayWriteOverItsArgument) {
   EXPECT_LE(DistanceFrom(geometry_, x.data()), 1e-15);
 }
 
-TEST_P(GeometryLaws, ThePlusJacobianIsThatOfPlus) {
+TEST_P(GeometryLaws, TheJacobiansOfPlusAreItsDerivatives) {
   constexpr double kStep = 1e-6;
   const auto n = static_cast<std::size_t>(geometry_.tangent);
   for (int k = 0; k < kPoints; ++k) {
     const Values x = Point(), d = Step(k % 4 == 0 ? 1e-5 : 0.02 * k / 2.0);
     const Values y = Plus(x, d);
-    std::vector<double> j(n * n);
-    PlusJacobian(geometry_, x.data(), d.data(), j.data());
-    for (std::size_t c = 0; c < n; ++c) {
-      Values above = d, below = d;
-      above[c] += kStep;
-      below[c] -= kStep;
-      const Values up = Minus(Plus(x, above), y), down = Minus(Plus(x, below), y);
+    std::vector<double> by_d(n * n), by_x(n * n);
+    PlusJacobian(geometry_, x.data(), d.data(), by_d.data());
+    PlusJacobianX(geometry_, x.data(), d.data(), by_x.data());
+    // Expects column c of j to be the difference quotient of plus(e), e = (0, ..., e_c, ..., 0).
+    const auto compare = [&](const std::vector<double>& j, std::size_t c, const auto& plus) {
+      Values above{}, below{};
+      above[c] = kStep;
+      below[c] = -kStep;
+      const Values up = Minus(plus(above), y), down = Minus(plus(below), y);
       for (std::size_t r = 0; r < n; ++r) {
         // The tolerance covers the rounding error, 1e-16 divided by the step, and the square of the
         // step.
         EXPECT_NEAR(j[r * n + c], (up[r] - down[r]) / (2.0 * kStep), 1e-8) << k;
       }
-    }
-  }
-}
-
-TEST_P(GeometryLaws, ThePlusJacobianXIsThatOfPlus) {
-  constexpr double kStep = 1e-6;
-  const auto n = static_cast<std::size_t>(geometry_.tangent);
-  for (int k = 0; k < kPoints; ++k) {
-    const Values x = Point(), d = Step(k % 4 == 0 ? 1e-5 : 0.02 * k / 2.0);
-    const Values y = Plus(x, d);
-    std::vector<double> j(n * n);
-    PlusJacobianX(geometry_, x.data(), d.data(), j.data());
+    };
     for (std::size_t c = 0; c < n; ++c) {
-      Values above{}, below{};
-      above[c] = kStep;
-      below[c] = -kStep;
-      const Values up = Minus(Plus(Plus(x, above), d), y), down = Minus(Plus(Plus(x, below), d), y);
-      for (std::size_t r = 0; r < n; ++r) {
-        EXPECT_NEAR(j[r * n + c], (up[r] - down[r]) / (2.0 * kStep), 1e-8) << k;
-      }
+      compare(by_d, c, [&](Values e) {
+        for (std::size_t i = 0; i < n; ++i) e[i] += d[i];
+        return Plus(x, e);
+      });
+      compare(by_x, c, [&](const Values& e) { return Plus(Plus(x, e), d); });
     }
   }
 }
